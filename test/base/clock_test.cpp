@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kphi {
-namespace clock_test {
+namespace kphi::clock_test {
 
 using namespace std::chrono_literals;
 
@@ -104,5 +103,4 @@ TEST(ManualClock, HasTheSameEpochInEveryRun) {
   EXPECT_EQ(ManualClock(7s).epoch_utc(), ManualClock().epoch_utc());
 }
 
-}  // namespace clock_test
-}  // namespace kphi
+}  // namespace kphi::clock_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kphi {
-namespace histogram_test {
+namespace kphi::histogram_test {
 
 using namespace std::chrono_literals;
 
@@ -27,5 +26,4 @@ TEST(DelayHistogram, TakesWhateverComes) {
   EXPECT_EQ(histogram.total(), 2u);
 }
 
-}  // namespace histogram_test
-}  // namespace kphi
+}  // namespace kphi::histogram_test

@@ -9,8 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace kphi {
-namespace number_test {
+namespace kphi::number_test {
 
 TEST(ParseDouble, TakesTheWholeTextOrNothing) {
   EXPECT_EQ(parse_double("1.5e3"), 1500);
@@ -67,5 +66,4 @@ TEST(Number, OfAnyMagnitudeReadsBackAsTheSameBits) {
   }));
 }
 
-}  // namespace number_test
-}  // namespace kphi
+}  // namespace kphi::number_test

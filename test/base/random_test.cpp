@@ -1,14 +1,12 @@
 #include "base/random.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-namespace kphi {
-namespace random_test {
+namespace kphi::random_test {
 
 using testing::ElementsAre;
 
@@ -105,5 +103,4 @@ TEST(Shuffle, BearsNothingAndOne) {
   EXPECT_THAT(one, ElementsAre(5));
 }
 
-}  // namespace random_test
-}  // namespace kphi
+}  // namespace kphi::random_test

@@ -4,8 +4,7 @@
 
 #include <array>
 
-namespace kphi {
-namespace statistics_test {
+namespace kphi::statistics_test {
 
 TEST(Statistics, MeanAndVariance) {
   const std::array<double, 4> values{1, 2, 3, 6};
@@ -23,5 +22,4 @@ TEST(Statistics, MediansDifferOnlyForAnEvenNumber) {
   EXPECT_EQ(median({7}), 7);
 }
 
-}  // namespace statistics_test
-}  // namespace kphi
+}  // namespace kphi::statistics_test

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <fstream>
-#include <stdexcept>
 
 #include "test/temporary_folder.hpp"
 

@@ -5,8 +5,7 @@
 
 #include "base/wakeup.hpp"
 
-namespace kphi {
-namespace thread_test {
+namespace kphi::thread_test {
 
 bool blocks(int signal) {
   sigset_t now;
@@ -57,5 +56,4 @@ TEST(Descriptor, ClosesOnceWhoeverHoldsIt) {
   EXPECT_EQ(::read(reader.number(), bytes, 2), 0) << "the writing end is closed";
 }
 
-}  // namespace thread_test
-}  // namespace kphi
+}  // namespace kphi::thread_test

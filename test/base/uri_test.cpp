@@ -1,16 +1,13 @@
 #include "base/uri.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <random>
 #include <stdexcept>
 
-namespace kphi {
-namespace uri_test {
+namespace kphi::uri_test {
 
-using testing::ElementsAre;
-using testing::Pair;
+using namespace testing;
 
 Uri uri(const std::string& text) { return Uri(text, "supply", "write supply:HOST"); }
 
@@ -114,5 +111,4 @@ TEST(Addresses, AreRefusedOrReadBackAsTheyWereWritten) {
   EXPECT_GT(refused, 1000);
 }
 
-}  // namespace uri_test
-}  // namespace kphi
+}  // namespace kphi::uri_test

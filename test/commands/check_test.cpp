@@ -1,5 +1,4 @@
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -8,14 +7,11 @@
 #include "test/temporary_folder.hpp"
 #include "test/verb.hpp"
 
-namespace kphi::profiles {
-namespace check_test {
+namespace kphi::profiles::check_test {
 
 using kphi::test::Said;
 using kphi::test::say;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::StartsWith;
+using namespace testing;
 
 class Check : public testing::Test {
  protected:
@@ -172,11 +168,9 @@ TEST(CheckCommand, ReadsTheShippedMotor) {
   EXPECT_THAT(said.out, HasSubstr("valid simulated motor\n  motor      2221 RPM/V, 0.045 ohm"));
 }
 
-TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
-  const kphi::test::TemporaryFolder folder;
+TEST_F(Check, RefusesAFaultScriptAtItsLineAndColumn) {
   const auto refused = [&](const std::string& text, const std::string& words) {
-    const std::string path = (folder.path() / "bad.yaml").string();
-    std::ofstream(path) << text;
+    const std::string path = write("bad.yaml", text);
     const Said said = say("check " + path);
     EXPECT_EQ(said.code, 2);
     EXPECT_EQ(said.out, "");
@@ -192,5 +186,4 @@ TEST(CheckCommand, RefusesAFaultScriptAtItsLineAndColumn) {
           "kphi-faults/1?");
 }
 
-}  // namespace check_test
-}  // namespace kphi::profiles
+}  // namespace kphi::profiles::check_test

@@ -1,7 +1,6 @@
 #include "commands/compensate.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <sstream>
 #include <streambuf>
@@ -12,13 +11,11 @@
 #include "base/error.hpp"
 #include "test/compensation/example_vehicle.hpp"
 
-namespace kphi::commands {
-namespace compensate_test {
+namespace kphi::commands::compensate_test {
 
 using namespace compensation;
 
-using testing::HasSubstr;
-using testing::StartsWith;
+using namespace testing;
 
 const std::string kHeader = "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n";
 const std::string kOutputHeader =
@@ -164,5 +161,4 @@ TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
   EXPECT_GT(source.output_sizes[3], source.output_sizes[2]);
 }
 
-}  // namespace compensate_test
-}  // namespace kphi::commands
+}  // namespace kphi::commands::compensate_test

@@ -26,13 +26,9 @@ TEST(Airframe, PutsTheHubsOfTheNamedShapesWhereTheyBelong) {
 }
 
 TEST(Airframe, AgreesWithTheKnownHubs) {
-  const auto vectors = geometry_vectors();
-  for (const GeometryVector& v : vectors) {
+  for (const GeometryVector& v : geometry_vectors()) {
     if (!v.arm) continue;
-    Airframe airframe;
-    airframe.half_side = Metres(v.half_side);
-    airframe.arm_length = Metres(v.arm_length);
-    airframe.propeller_radius = Metres(v.radius);
+    const Airframe airframe = example_airframe_of(v.half_side, v.arm_length, v.radius);
     const HubPosition hub = hub_in_body(airframe, *v.arm, Radians(v.theta));
     EXPECT_NEAR(hub.x.value(), v.hub_x, 1e-15);
     EXPECT_NEAR(hub.y.value(), v.hub_y, 1e-15);

@@ -1,6 +1,8 @@
 // The known answers of test/golden/geometry_vectors.csv; test/golden/README.md says what its columns are.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <charconv>
 #include <fstream>
 #include <optional>
@@ -16,15 +18,9 @@ namespace kphi::compensation {
 struct GeometryVector {
   std::string kind;
   std::optional<std::size_t> arm;  ///< as the next two, random rows only
-  double theta = 0;
-  double arm_length = 0;
-  double half_side = 0;
-  double radius = 0;
-  double hub_x = 0;
-  double hub_y = 0;
-  double phi_arc = 0;
-  double phi_area = 0;
-  double phi_load = 0;
+  double theta = 0, arm_length = 0;
+  double half_side = 0, radius = 0, hub_x = 0, hub_y = 0;
+  double phi_arc = 0, phi_area = 0, phi_load = 0;
 };
 
 inline double exact_number(const std::string& text) {
@@ -44,23 +40,24 @@ inline std::vector<GeometryVector> geometry_vectors() {
     std::vector<std::string> cells;
     std::istringstream row(line);
     for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-    GeometryVector vector;
-    vector.kind = cells.at(0);
-    if (!cells.at(1).empty()) {
-      vector.arm = static_cast<std::size_t>(exact_number(cells[1]));
-      vector.theta = exact_number(cells.at(2));
-      vector.arm_length = exact_number(cells.at(4));
-    }
-    vector.half_side = exact_number(cells.at(3));
-    vector.radius = exact_number(cells.at(5));
-    vector.hub_x = exact_number(cells.at(6));
-    vector.hub_y = exact_number(cells.at(7));
-    vector.phi_arc = exact_number(cells.at(8));
-    vector.phi_area = exact_number(cells.at(10));
-    vector.phi_load = exact_number(cells.at(11));
-    vectors.push_back(vector);
+    const auto number = [&](std::size_t column) { return exact_number(cells.at(column)); };
+    const bool has_arm = !cells.at(1).empty();
+    vectors.push_back({cells[0], has_arm ? std::optional(static_cast<std::size_t>(number(1))) : std::nullopt,
+                       has_arm ? number(2) : 0, has_arm ? number(4) : 0, number(3), number(5), number(6), number(7),
+                       number(8), number(10), number(11)});
   }
   return vectors;
+}
+
+inline void expect_known_arc(double phi, const GeometryVector& v) {
+  const bool outside = v.kind == "tangent_edge_outside",
+             near = v.kind == "tangent_edge_1um_in" || v.kind == "corner_touch" || v.kind == "corner_poke_1mm";
+  EXPECT_GE(phi, 0.0);
+  EXPECT_NEAR(phi, outside ? 0 : v.phi_arc,
+              outside ? 1e-7
+              : near  ? 1e-9
+                      : 1e-12)
+      << v.kind << " at (" << v.hub_x << ", " << v.hub_y << ")";
 }
 
 }  // namespace kphi::compensation

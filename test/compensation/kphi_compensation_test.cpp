@@ -4,13 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <limits>
 #include <random>
 #include <string>
 
-#include "compensation/mixing.hpp"
 #include "test/compensation/example_vehicle.hpp"
-#include "test/compensation/line_of.hpp"
 
 namespace kphi::compensation {
 namespace kphi_compensation_test {
@@ -95,7 +92,7 @@ TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
   kphi_speed_uncertainties(&compensator, thrusts, 0, uncertainties);
   EXPECT_NEAR(uncertainties[0] / speeds[0], 0.005, 1e-12);
   EXPECT_NEAR(uncertainties[1] / speeds[1], 0.5 * 2e-9 * speeds[1] * speeds[1], 1e-12) << "of k = 1 N over speed²";
-  EXPECT_EQ(uncertainties[3], std::numeric_limits<double>::infinity());
+  EXPECT_EQ(uncertainties[3], kInfinity);
 }
 
 TEST(PlainInterface, TakesAPolygonBody) {
@@ -118,7 +115,8 @@ TEST(PlainInterface, TakesAPolygonBody) {
 }
 
 TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
-  const auto refusal = [](void (*spoil)(kphi_line&, kphi_airframe&), int law = KPHI_LAW_CLAMPED) {
+  const auto expect = [](const std::string& words, void (*spoil)(kphi_line&, kphi_airframe&),
+                         int law = KPHI_LAW_CLAMPED) {
     kphi_line lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
     kphi_airframe airframe = plain_airframe();
     spoil(lines[2], airframe);
@@ -127,20 +125,18 @@ TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
     const kphi_compensator before = compensator;
     const int code = kphi_compensator_build(&compensator, lines, &airframe, law);
     EXPECT_EQ(std::memcmp(&compensator, &before, sizeof before), 0);
-    EXPECT_NE(std::string(kphi_refusal_text(code)), "unknown refusal");
     EXPECT_NE(code, 0);
-    return std::string(kphi_refusal_text(code));
+    EXPECT_NE(std::string(kphi_refusal_text(code)).find(words), std::string::npos) << words;
   };
-  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.thrust_coefficient = 0; }).find("K_T"),
-            std::string::npos);
-  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.overlap = KPHI_AREA_SHARE; }).find("overlap measure"),
-            std::string::npos);
-  EXPECT_NE(refusal([](kphi_line& line, kphi_airframe&) { line.overlap = 3; }).find("line"), std::string::npos);
-  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.overlap = -1; }).find("overlap"), std::string::npos);
-  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.corner_count = 13; }).find("corners"), std::string::npos);
-  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.corner_count = -1; }).find("corners"), std::string::npos);
-  EXPECT_NE(refusal([](kphi_line&, kphi_airframe& a) { a.arm_length = 0.05; }).find("arm"), std::string::npos);
-  EXPECT_NE(refusal([](kphi_line&, kphi_airframe&) {}, 2).find("law"), std::string::npos);
+  expect("K_T", [](kphi_line& line, kphi_airframe&) { line.thrust_coefficient = 0; });
+  expect("overlap measure", [](kphi_line& line, kphi_airframe&) { line.overlap = KPHI_AREA_SHARE; });
+  expect("line", [](kphi_line& line, kphi_airframe&) { line.overlap = 3; });
+  expect("overlap", [](kphi_line&, kphi_airframe& a) { a.overlap = -1; });
+  expect("corners", [](kphi_line&, kphi_airframe& a) { a.corner_count = 13; });
+  expect("corners", [](kphi_line&, kphi_airframe& a) { a.corner_count = -1; });
+  expect("arm", [](kphi_line&, kphi_airframe& a) { a.arm_length = 0.05; });
+  expect(
+      "law", [](kphi_line&, kphi_airframe&) {}, 2);
   EXPECT_STREQ(kphi_refusal_text(-1), "unknown refusal");
 }
 

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -16,6 +18,7 @@
 
 #include "daq/campaign/operator.hpp"
 #include "daq/run/run.hpp"
+#include "drivers/sim/netbox/settings.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
@@ -27,6 +30,9 @@ inline std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
+
+/// N per (rad/s)² of the simulated propeller "5x3".
+inline constexpr double kTrueK5x3 = 1.7e-8 / (kRadPerSecPerRpm * kRadPerSecPerRpm);
 
 /// Name → bytes.
 using Files = std::map<std::string, std::string>;
@@ -66,9 +72,47 @@ inline profiles::BenchConfig deterministic_config(int seed, const std::string& f
       "bench.yaml");
 }
 
-/// Keeps the lines that a run says, and calls `then` with each.
+/// Nobody asks for a stop.
+inline bool never() { return false; }
+
+/// Of the error that the call throws; "": it throws none.
+template <class Error, class Call>
+std::string words_of(Call&& call) {
+  try {
+    (void)call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A stream, and what was written to it.
+class Written {
+ public:
+  ~Written() {
+    std::fclose(stream);
+    std::free(text_);
+  }
+  std::string text() {
+    std::fflush(stream);
+    return {text_, size_};
+  }
+
+ private:
+  char* text_ = nullptr;
+  std::size_t size_ = 0;
+
+ public:
+  std::FILE* const stream = open_memstream(&text_, &size_);
+};
+
+/// Keeps the lines that a run says, and calls `then` with each, and `at_tick`.
 class SaidLines final : public daq::Progress {
  public:
+  void tick(const daq::Position& position, const daq::Observation& seen) override {
+    if (at_tick) at_tick(position, seen);
+  }
+  void step_done(const daq::Position& position, const daq::Observation& seen) override { tick(position, seen); }
   void say(const std::string& line) override {
     lines.push_back(line);
     if (then) then(line);
@@ -80,11 +124,14 @@ class SaidLines final : public daq::Progress {
   }
   std::vector<std::string> lines;
   std::function<void(const std::string&)> then;
+  std::function<void(const daq::Position&, const daq::Observation&)> at_tick;
 };
 
-/// Remembers what it was asked, refuses to mount `refuse_at_deg`, and decides as it is told.
+/// Remembers what it was asked, refuses to mount `refuse_at_deg`, does something at the stand, and decides as it is
+/// told.
 class ScriptedOperator final : public daq::Operator {
  public:
+  using Operator::poll;
   [[nodiscard]] bool run_again(const daq::AnotherRun& question) override {
     questions.push_back(question);
     return decision;
@@ -93,6 +140,7 @@ class ScriptedOperator final : public daq::Operator {
   std::vector<double> mounted_deg;
   std::vector<daq::AnotherRun> questions;
   double refuse_at_deg = -1;
+  std::function<void()> at_the_stand;
   bool decision = true;
 
  protected:
@@ -100,6 +148,7 @@ class ScriptedOperator final : public daq::Operator {
     propeller = under.id;
     mounted_deg.push_back(occlusion_deg);
     if (occlusion_deg == refuse_at_deg) throw daq::NotMounted("no");
+    if (at_the_stand) at_the_stand();
   }
 };
 
@@ -117,6 +166,14 @@ bool motor_is_let_go(Bench& bench) {
   bench.wait_until(bench.clock().now() + std::chrono::seconds(1));
   const double after = std::abs(bench.simulation().plant().motor().speed);
   return after < 1.0 || after < 0.7 * before;
+}
+
+/// A gage bias shifts what the box shows by a fifth of the range.
+template <class Bench>
+void shift_cell(Bench& bench, std::size_t axis) {
+  sim::NetBoxSettings settings;
+  settings.bias_vector[axis] = -6554;
+  bench.simulation().netbox().configure(settings);
 }
 
 /// The campaign's first run, without occlusion, as if somebody had confirmed that; keeps what it is given.

@@ -1,8 +1,6 @@
 // A module whose clock is off by half a percent, and a bench file that knows it.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "daq/run/run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
 #include "results/reduction/reduction.hpp"
@@ -11,29 +9,6 @@
 
 namespace kphi::daq {
 namespace clock_gain_test {
-
-/// The simulator's own speed at every tick of the runner.
-class TrueSpeed final : public Progress {
- public:
-  explicit TrueSpeed(DeterministicBench& bench) : bench_(bench) {}
-  void tick(const Position&, const Observation&) override {
-    seen_.push_back({to_seconds(bench_.clock().now()), bench_.simulation().plant().motor().speed});
-  }
-  [[nodiscard]] double mean(double begin_s, double end_s) const {
-    double sum = 0;
-    int n = 0;
-    for (const auto& [time, speed] : seen_) {
-      if (time < begin_s || time >= end_s) continue;
-      sum += speed;
-      ++n;
-    }
-    return sum / n;
-  }
-
- private:
-  DeterministicBench& bench_;
-  std::vector<std::pair<double, double>> seen_;
-};
 
 TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
   std::string text = test::deterministic_config(3).text;
@@ -46,14 +21,25 @@ TEST(ClockGain, GivesTrueSpeedsFromAModuleWhoseClockIsFast) {
   fast.oscillator_gain = 0.005;
   DeterministicBench bench(config, fast);
   bench.mounted("5x3", 0);
-  TrueSpeed truth(bench);
+  std::vector<std::pair<double, double>> truth;  // time and the simulator's own speed at every tick of the runner
+  test::SaidLines said;
+  said.at_tick = [&](const Position&, const Observation&) {
+    truth.emplace_back(to_seconds(bench.clock().now()), bench.simulation().plant().motor().speed);
+  };
   const test::TemporaryFolder folder;
   const auto file = folder.path() / "run.h5";
-  (void)record_run(bench, test::first_run(campaign, config, file), truth, [] { return false; });
+  (void)record_run(bench, test::first_run(campaign, config, file), said, test::never);
   const auto steps = reduce(results::read_run(file));
   ASSERT_EQ(steps.size(), 3u);
   for (const auto& step : steps) {
-    const double true_mean = truth.mean(step.window_begin_s, step.window_end_s);
+    double sum = 0;
+    int n = 0;
+    for (const auto& [time, speed] : truth) {
+      if (time < step.window_begin_s || time >= step.window_end_s) continue;
+      sum += speed;
+      ++n;
+    }
+    const double true_mean = sum / n;
     EXPECT_NEAR(step.speed_rad_s, true_mean, 2e-4 * true_mean);
     EXPECT_NEAR(true_mean, 1.005 * step.commanded_speed_rad_s, 1e-3 * true_mean) << "it holds what it reports";
     EXPECT_EQ(step.quality_flags, 0u);

@@ -40,13 +40,11 @@ class ModelDisk final : public results::FileLayer {
     if (fd < 0 || ::pread(fd, bytes.data(), bytes.size(), 0) != status.st_size)
       throw std::system_error(errno, std::generic_category());
     ::close(fd);
-    live(status.st_ino).bytes = std::move(bytes);
+    shared(status.st_ino)->bytes = std::move(bytes);
   }
   void sync_folder(const std::filesystem::path& folder) override {
     next();
-    Names names;
-    for (const auto& [name, inode] : entries(folder)) names[name] = inode;
-    durable_[folder.string()] = std::move(names);
+    durable_[folder.string()] = entries(folder);
   }
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override {
     next();
@@ -69,7 +67,7 @@ class ModelDisk final : public results::FileLayer {
     std::filesystem::create_directories(image);
     const bool now = random() % 2 == 0;
     const Names& names = now ? entries(folder) : durable_[folder.string()];
-    for (const auto& [name, inode] : names) write(folder, name, *inode, image / name, random);
+    for (const auto& [name, inode] : names) write(folder, *inode, image / name, random);
     for (const auto& entry : std::filesystem::directory_iterator(folder)) {
       if (entry.is_directory()) cut_power(entry.path(), image / entry.path().filename(), seed * 31 + 7);
     }
@@ -82,7 +80,6 @@ class ModelDisk final : public results::FileLayer {
   using Names = std::map<std::string, std::shared_ptr<Inode>>;
 
   void next() { before_(operations_++); }
-  Inode& live(ino_t number) { return *shared(number); }
   std::shared_ptr<Inode> shared(ino_t number) {
     auto& inode = live_[number];
     if (!inode) inode = std::make_shared<Inode>();
@@ -104,8 +101,8 @@ class ModelDisk final : public results::FileLayer {
     }
     return inode.bytes;
   }
-  void write(const std::filesystem::path& folder, const std::string&, const Inode& inode,
-             const std::filesystem::path& to, std::mt19937& random) {
+  void write(const std::filesystem::path& folder, const Inode& inode, const std::filesystem::path& to,
+             std::mt19937& random) {
     constexpr std::size_t kPage = 4096;
     const std::string present = present_bytes(folder, inode);
     std::string bytes = inode.bytes;

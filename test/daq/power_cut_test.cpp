@@ -1,16 +1,9 @@
 // At any file operation of a campaign: the program is killed, the power is cut, or the disk refuses. Then it is
 // resumed.
-#include <gmock/gmock.h>
-
-#include <map>
 #include <set>
 
-#include "base/error.hpp"
-#include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/resume.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_folder.hpp"
-#include "results/journal.hpp"
+#include "test/daq/campaign_on_bench.hpp"
 #include "test/daq/model_disk.hpp"
 
 namespace kphi::daq {
@@ -22,31 +15,27 @@ constexpr int kImages = 6;    // that are resumed to the end
 constexpr int kGlances = 40;  // at others, whether anything is lost
 constexpr int kRefusals = 6;
 
-class Counting final : public Progress {
- public:
-  void say(const std::string& line) override { accepted += line.starts_with("run "); }
-  int accepted = 0;  ///< runs of which the program has said that they are
-};
-
-using test::Files;
-using test::measured_in;
-
 /// Two occlusions, two steps.
-class AnyOperation : public testing::Test {
+class AnyOperation : public CampaignOnBench {
  protected:
-  void run(results::FileLayer& files, Progress& progress, const results::CampaignFolder& folder) {
-    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
-    bench.use_files(files);
-    AutoConfirmOperator person;
-    (void)run_campaign(bench, campaign_, config_, folder, person, progress, [] { return false; });
+  AnyOperation() {
+    config_ = test::deterministic_config(6);
+    campaign_ = test::short_campaign("0, 90", 1, 2);
   }
+  void run(results::FileLayer& files, const results::CampaignFolder& folder) {
+    bench_.emplace(config_, sim::BenchSettings{}, DeterministicBench::Lives::one_run);
+    bench_->use_files(files);
+    said_.lines.clear();
+    (void)go(*bench_, folder);
+  }
+  /// Runs of which the program has said that they are.
+  [[nodiscard]] int accepted() const { return static_cast<int>(said_.count("run  ")); }
   /// The same campaign on another disk, and nothing happens.
   int count_operations() {
     test::ModelDisk disk([](int) {});
-    Progress progress;
     const auto folder = results::CampaignFolder::create(folder_.path(), "whole", "c", disk);
-    run(disk, progress, folder);
-    whole_ = measured_in(folder);
+    run(disk, folder);
+    whole_ = test::measured_in(folder);
     return disk.operations();
   }
   std::set<int> some_of(int operations, int count) {
@@ -72,20 +61,14 @@ class AnyOperation : public testing::Test {
     SCOPED_TRACE(when);
     const auto folder = results::CampaignFolder::open(path);
     const Resumption resumption = inspect(folder, false);
-    Progress progress;
-    AutoConfirmOperator person;
     DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
-    (void)run_campaign(
-        bench, campaign_, config_, folder, person, progress, [] { return false; }, &resumption);
+    (void)go(bench, folder, &resumption);
     const auto found = results::verify_campaign(folder);
     EXPECT_TRUE(found.whole()) << testing::PrintToString(found.problems);
-    EXPECT_TRUE(measured_in(folder) == whole_);
+    EXPECT_TRUE(test::measured_in(folder) == whole_);
   }
 
-  test::TemporaryFolder folder_;
-  profiles::BenchConfig config_ = test::deterministic_config(6);
-  profiles::Campaign campaign_ = test::short_campaign("0, 90", 1, 2);
-  Files whole_;
+  test::Files whole_;
 };
 
 TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
@@ -98,7 +81,6 @@ TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
     std::string when;
   };
   std::vector<Image> images;
-  Counting progress;
   fs::path folder;
   test::ModelDisk* disk = nullptr;
   test::ModelDisk cut([&](int n) {
@@ -107,20 +89,20 @@ TEST_F(AnyOperation, KilledOrWithoutPowerLosesNoAcceptedRun) {
     const std::string when = fmt::format("power cut before operation {}", n);
     disk->cut_power(folder, dark, static_cast<unsigned>(n));
     if (!moments.contains(n)) {
-      expect_nothing_lost(dark, progress.accepted, when);
+      expect_nothing_lost(dark, accepted(), when);
       fs::remove_all(dark);
       return;
     }
-    images.push_back({dark, progress.accepted, when});
+    images.push_back({dark, accepted(), when});
     const fs::path killed = folder_.path() / fmt::format("killed-{}", n);
     fs::copy(folder, killed, fs::copy_options::recursive);
-    images.push_back({killed, progress.accepted, fmt::format("killed before operation {}", n)});
+    images.push_back({killed, accepted(), fmt::format("killed before operation {}", n)});
   });
   disk = &cut;
   const auto results = results::CampaignFolder::create(folder_.path(), "cut", "c", cut);
   folder = results.path();
-  run(cut, progress, results);
-  EXPECT_EQ(progress.accepted, 2);
+  run(cut, results);
+  EXPECT_EQ(accepted(), 2);
   ASSERT_GE(images.size(), 2u * (kImages - 1));
   for (const Image& image : images) expect_resumable(image.path, image.accepted, image.when);
 }
@@ -129,8 +111,7 @@ TEST_F(AnyOperation, WouldLoseRunsIfFilesWereNotSynced) {
   test::ModelDisk disk([](int) {});
   disk.forgets_syncs = true;
   const auto folder = results::CampaignFolder::create(folder_.path(), "forgotten", "c", disk);
-  Counting progress;
-  run(disk, progress, folder);
+  run(disk, folder);
   int lost = 0;
   for (unsigned seed = 1; seed <= 8; ++seed) {
     const fs::path dark = folder_.path() / fmt::format("dark-{}", seed);
@@ -148,21 +129,17 @@ TEST_F(AnyOperation, RefusedStopsTheMotorSaysWhyAndCanBeResumed) {
   const int operations = count_operations();
   for (const int moment : some_of(operations - 3, kRefusals)) {
     SCOPED_TRACE(moment);
-    Counting progress;
     bool armed = false;
     test::ModelDisk disk([&](int n) {
       if (armed && n >= moment + 2) throw std::system_error(ENOSPC, std::generic_category());
     });
     const auto folder = results::CampaignFolder::create(folder_.path(), fmt::format("full-{}", moment), "c", disk);
     armed = true;
-    DeterministicBench bench(config_, {}, DeterministicBench::Lives::one_run);
-    bench.use_files(disk);
-    AutoConfirmOperator person;
-    EXPECT_THAT([&] { (void)run_campaign(bench, campaign_, config_, folder, person, progress, [] { return false; }); },
+    EXPECT_THAT([&] { run(disk, folder); },
                 testing::ThrowsMessage<std::exception>(
                     testing::AllOf(testing::HasSubstr("disk full: "), testing::HasSubstr(folder.path().string()))));
-    EXPECT_TRUE(test::motor_is_let_go(bench));
-    expect_resumable(folder.path(), progress.accepted, "resumed with room");
+    EXPECT_TRUE(motor_is_let_go());
+    expect_resumable(folder.path(), accepted(), "resumed with room");
   }
 }
 

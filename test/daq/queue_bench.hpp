@@ -1,6 +1,7 @@
 // A bench whose devices say what a test puts in.
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <stdexcept>
 #include <utility>
@@ -43,7 +44,7 @@ class QueueSupply final : public SupplyLink {
 };
 
 /// A motor that says what a test puts in.
-class QueueMotor final : public MotorLink {
+class QueueMotor : public MotorLink {
  public:
   void spin_at(RadPerSec) override {}
   void renew() noexcept override {}
@@ -74,6 +75,14 @@ inline results::LoadCellScale mini40() {
   results::LoadCellScale scale;
   scale.range = {20, 20, 60, 1, 1, 1};
   return scale;
+}
+
+/// What a mini40() shows; the other axes 0.
+inline LoadCellRecord load_of(double fz_n, double tz_nm = 0) {
+  LoadCellRecord record;
+  record.counts[2] = static_cast<std::int32_t>(std::lround(1e6 * fz_n));
+  record.counts[5] = static_cast<std::int32_t>(std::lround(1e6 * tz_nm));
+  return record;
 }
 
 /// A bench of queues that a test fills, with a mini40().

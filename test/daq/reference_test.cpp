@@ -1,11 +1,5 @@
 // results/reference was recorded once and must be understood for ever: a reader that changes its mind shows here.
-#include <gtest/gtest.h>
-
-#include "results/campaign_folder.hpp"
-#include "results/reduction/reduction.hpp"
-#include "results/reduction/repetitions.hpp"
-#include "results/run_reader.hpp"
-#include "results/steps_csv.hpp"
+#include "test/daq/campaign_on_bench.hpp"
 #include "test/source_dir.hpp"
 
 namespace kphi::daq {
@@ -24,10 +18,7 @@ TEST_F(Reference, IsWhole) {
 }
 
 TEST_F(Reference, GivesTheStoredStepMeansByteForByte) {
-  std::vector<results::StepMean> steps;
-  for (const auto& file : folder_.complete_runs(std::vector<double>{0, 90, 270})) {
-    for (const auto& step : reduce(results::read_run(file))) steps.push_back(step);
-  }
+  const auto steps = steps_of(folder_.complete_runs(std::vector<double>{0, 90, 270}));
   ASSERT_EQ(steps.size(), 12u);
   EXPECT_EQ(results::format_steps(steps), results::read_text(folder_.steps()));
   EXPECT_EQ(results::format_steps(means_of(steps)), results::read_text(folder_.means()));

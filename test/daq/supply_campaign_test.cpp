@@ -1,16 +1,7 @@
 // Campaigns on the deterministic bench whose motor hangs on the simulated supply.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <utility>
 
-#include "daq/campaign/campaign_run.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_folder.hpp"
-#include "results/reduction/reduction.hpp"
-#include "results/run_reader.hpp"
-#include "results/steps_csv.hpp"
-#include "test/daq/bench_fixture.hpp"
+#include "test/daq/campaign_on_bench.hpp"
 
 namespace kphi::daq {
 namespace supply_campaign_test {
@@ -18,23 +9,9 @@ namespace supply_campaign_test {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-class NoteMotor final : public Progress {
- public:
-  void tick(const Position& position, const Observation&) override {
-    if (act) act(position);
-  }
-  std::function<void(const Position&)> act;
-};
-
-class SupplyCampaign : public testing::Test {
+class SupplyCampaign : public CampaignOnBench {
  protected:
-  CampaignResult run(double current_limit_a = 50) {
-    config_ = test::with_supply(test::deterministic_config(4), current_limit_a);
-    bench_.emplace(config_);
-    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
-    AutoConfirmOperator person;
-    return run_campaign(*bench_, campaign_, config_, *results_, person, progress_, [] { return false; });
-  }
+  SupplyCampaign() { config_ = test::with_supply(test::deterministic_config(4)); }
   /// From now on; `count` answers, or 0: all of a minute.
   void spoil(sim::FaultKind kind, std::uint64_t count) {
     sim::Fault fault;
@@ -45,64 +22,56 @@ class SupplyCampaign : public testing::Test {
     bench_->simulation().supply()->add_fault(fault);
   }
   sim::SupplyCircuit& circuit() { return bench_->simulation().supply()->circuit(); }
-  [[nodiscard]] results::RunRecording aborted() const {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_.path())) {
-      if (entry.path().string().ends_with(".aborted.h5")) return results::read_run(entry.path());
-    }
-    ADD_FAILURE() << "no aborted run";
-    return {};
+  void in_step(int step, std::function<void()> act, int tick = 1) {
+    said_.at_tick = [=, ticks = 0](const Position& position, const Observation&) mutable {
+      if (position.step == step && ++ticks == tick) act();
+    };
+  }
+  void expect_coast() {
+    bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
+    EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
   }
   /// Runs into `reason`, after `act` was done in the middle of the third step; then what every safety stop must leave
   /// is held.
-  void expect_stop(double limit_a, std::function<void()> act, const std::string& reason) {
-    int ticks = 0;
-    progress_.act = [&](const Position& position) {
-      if (position.step == 2 && ++ticks == 30) act();
-    };
-    EXPECT_THAT([&] { (void)run(limit_a); }, ThrowsMessage<SafetyStop>(HasSubstr(reason))) << "nothing stopped the run";
+  void expect_stop(std::function<void()> act, const std::string& reason) {
+    in_step(2, std::move(act), 30);
+    EXPECT_THAT(test::words_of<SafetyStop>([&] { return run(); }), HasSubstr(reason));
     EXPECT_FALSE(circuit().output());
-    bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
-    EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
-    const results::RunRecording kept = aborted();
-    EXPECT_THAT(kept.outcome_reason, HasSubstr(reason));
-    EXPECT_GT(kept.load_cell.size(), 5000u);
-    EXPECT_GT(kept.supply.size(), 3u);
+    expect_coast();
+    EXPECT_THAT(aborted().outcome_reason, HasSubstr(reason));
+    EXPECT_GT(aborted().load_cell.size(), 5000u);
+    EXPECT_GT(aborted().supply.size(), 3u);
   }
-
-  test::TemporaryFolder folder_;
-  profiles::Campaign campaign_ = test::short_campaign("0, 90");
-  profiles::BenchConfig config_;
-  std::optional<DeterministicBench> bench_;
-  std::optional<results::CampaignFolder> results_;
-  NoteMotor progress_;
 };
 
 TEST_F(SupplyCampaign, RecordsWhatTheSupplyShows) {
   const CampaignResult result = run();
   EXPECT_EQ(result.runs, 2);
   EXPECT_EQ(result.flagged_steps, 0);
-  const auto recording = results::read_run(results_->complete_runs(campaign_.occlusions_deg).at(0));
-  EXPECT_EQ(recording.header.supply_identity, "simulated supply");
-  ASSERT_GT(recording.supply.size(), 8u);
-  for (const auto& reading : recording.supply) {
+  EXPECT_EQ(recording(0).header.supply_identity, "simulated supply");
+  ASSERT_GT(recording(0).supply.size(), 8u);
+  for (const auto& reading : recording(0).supply) {
     EXPECT_EQ(reading.output, 1u);
     EXPECT_EQ(reading.set_voltage_v, 12);
     EXPECT_EQ(reading.current_limit_a, 50);
   }
-  EXPECT_TRUE(results::verify_run(results_->complete_runs(campaign_.occlusions_deg).at(0)).whole());
+  EXPECT_TRUE(results::verify_run(runs().at(0)).whole());
 }
 
-TEST_F(SupplyCampaign, GivesPowerPerStepAsTheModuleSawIt) {
+TEST_F(SupplyCampaign, GivesPowerPerStepAsTheModuleSawItAndTheSameForTheSameSeed) {
   (void)run();
-  const auto steps = results::read_steps(results_->steps());
-  ASSERT_EQ(steps.size(), 8u);
-  for (const auto& step : steps) {
+  const auto given = steps();
+  ASSERT_EQ(given.size(), 8u);
+  for (const auto& step : given) {
     EXPECT_NEAR(step.supply_a, step.supply_current_a, 0.1 * step.supply_current_a + 0.1) << step.step;
     EXPECT_NEAR(step.supply_v, 12 - 0.020 * step.supply_a, 0.02) << step.step;
     EXPECT_NEAR(step.supply_w, step.supply_v * step.supply_a, 0.02 * step.supply_w) << step.step;
     EXPECT_NEAR(step.supply_voltage_v, step.supply_v, 0.1) << "one circuit";
   }
-  EXPECT_GT(steps[3].supply_w, 3 * steps[0].supply_w);
+  EXPECT_GT(given[3].supply_w, 3 * given[0].supply_w);
+  const std::string first = test::bytes_of(results_->steps());
+  (void)run();
+  EXPECT_EQ(test::bytes_of(results_->steps()), first);
 }
 
 TEST_F(SupplyCampaign, StepsWithoutASupplyHaveNoSuchColumns) {
@@ -112,52 +81,28 @@ TEST_F(SupplyCampaign, StepsWithoutASupplyHaveNoSuchColumns) {
   EXPECT_THAT(results::format_steps({&step, 1}), HasSubstr(",quality_flags,supply_v,supply_a,supply_w\n"));
 }
 
-TEST_F(SupplyCampaign, StopsWhenTheSupplyLimitsTheCurrent) {
-  expect_stop(
-      50, [&] { circuit().controls().amps = 0.9 * circuit().amps(); }, "current limit reached");
-}
-
-TEST_F(SupplyCampaign, StopsWhenItsProtectionTrips) {
-  expect_stop(
-      50, [&] { circuit().trip(SupplyProtection::over_voltage); }, "over-voltage protection switched the output off");
-}
-
-TEST_F(SupplyCampaign, StopsWhenSomebodyTurnsTheKnob) {
-  expect_stop(
-      50, [&] { circuit().controls().volts = 11.8; }, "changed on the front panel");
+TEST_F(SupplyCampaign, StopsWhenTheSupplyLimitsTheCurrentItsProtectionTripsOrSomebodyTurnsTheKnob) {
+  expect_stop([&] { circuit().controls().amps = 0.9 * circuit().amps(); }, "current limit reached");
+  expect_stop([&] { circuit().trip(SupplyProtection::over_voltage); },
+              "over-voltage protection switched the output off");
+  expect_stop([&] { circuit().controls().volts = 11.8; }, "changed on the front panel");
 }
 
 TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
-  bool closed = false;
-  progress_.act = [&](const Position& position) {
-    if (position.step == 0 && !std::exchange(closed, true)) spoil(sim::FaultKind::supply_closed, 0);
-  };
+  in_step(0, [&] { spoil(sim::FaultKind::supply_closed, 0); });
   EXPECT_THAT([&] { (void)run(); },
               ThrowsMessage<SafetyStop>(testing::AllOf(testing::StartsWith("supply:"), HasSubstr("it may be ON"))))
       << "nobody missed the supply";
-  bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(200));
-  EXPECT_EQ(bench_->simulation().motor().stage().mode, sim::PowerStage::Mode::coast);
+  expect_coast();
 }
 
 TEST_F(SupplyCampaign, BearsAnAnswerThatIsLost) {
-  bool lost = false;
-  progress_.act = [&](const Position& position) {
-    if (position.step == 1 && !std::exchange(lost, true)) spoil(sim::FaultKind::supply_bad_crc, 2);
-  };
+  in_step(1, [&] { spoil(sim::FaultKind::supply_bad_crc, 2); });
   EXPECT_EQ(run().flagged_steps, 0);
 }
 
-TEST_F(SupplyCampaign, IsTheSameForTheSameSeed) {
-  (void)run();
-  const std::string first = results::read_text(results_->steps());
-  std::filesystem::remove_all(results_->path());
-  (void)run();
-  EXPECT_EQ(results::read_text(results_->steps()), first);
-}
-
 TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {
-  expect_stop(
-      50, [&] { circuit().trip(SupplyProtection::over_current); }, "over-current");
+  expect_stop([&] { circuit().trip(SupplyProtection::over_current); }, "over-current");
   const results::RunRecording kept = aborted();
   const auto first = std::find_if(kept.supply.begin(), kept.supply.end(), [](const auto& r) { return r.output == 0; });
   ASSERT_NE(first, kept.supply.end());
@@ -165,61 +110,32 @@ TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {
   EXPECT_LT(kept.load_cell.back().arrival_ns - first->time_ns, 200'000'000);
 }
 
-/// At the prompt: acts, then lets time pass, with or without looking at the guard.
-class MeddlingOperator final : public Operator {
- public:
-  std::function<void()> act;
-  DeterministicBench* bench = nullptr;
-  bool looks = true;
-
- protected:
-  void mount(const profiles::Propeller&, double, const std::string&) override {
-    act();
-    for (int i = 0; i < 60; ++i) {
-      bench->wait_until(bench->clock().now() + std::chrono::milliseconds(10));
-      if (looks) poll();
-    }
-  }
-};
-
-class AtTheStand : public SupplyCampaign {
- protected:
-  AtTheStand() {
-    config_ = test::with_supply(test::deterministic_config(4));
-    bench_.emplace(config_);
-    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "c"));
-    person_.bench = &*bench_;
-  }
-  void run_with_person() {
-    (void)run_campaign(*bench_, campaign_, config_, *results_, person_, progress_, [] { return false; });
-  }
-  MeddlingOperator person_;
-};
-
-TEST_F(AtTheStand, AnOutputThatComesOnUnaskedIsASafetyStopWhetherOrNotThePromptNotices) {
-  person_.act = [this] { circuit().switch_output(true); };
+TEST_F(SupplyCampaign, AnOutputThatComesOnUnaskedAtThePromptIsASafetyStopWhetherOrNotThePromptNotices) {
   for (const bool looks : {true, false}) {
-    person_.looks = looks;
-    EXPECT_THAT([&] { run_with_person(); },
-                testing::ThrowsMessage<SafetyStop>(HasSubstr("output is on while somebody may be near")));
+    person_.at_the_stand = [&] {
+      circuit().switch_output(true);
+      for (int i = 0; i < 60; ++i) {
+        bench_->wait_until(bench_->clock().now() + std::chrono::milliseconds(10));
+        if (looks) person_.poll();
+      }
+    };
+    EXPECT_THAT([&] { (void)run(); }, ThrowsMessage<SafetyStop>(HasSubstr("output is on while somebody may be near")));
     EXPECT_FALSE(circuit().output());
-    if (!looks) break;
-    results_.emplace(results::CampaignFolder::create(folder_.path(), "u", "again"));
-    bench_->restore_power();
   }
 }
 
-TEST_F(AtTheStand, NobodyIsAskedToComeNearBeforeTheRotorIsAtRestWithoutPower) {
+TEST_F(SupplyCampaign, NobodyIsAskedToComeNearBeforeTheRotorIsAtRestWithoutPower) {
   campaign_ = test::short_campaign("0", 1, 2);
+  prepare();
   bench_->motor().spin_at(from_rpm(6000));
   bench_->wait_until(bench_->clock().now() + std::chrono::seconds(1));
   bench_->motor().emergency_stop();
   double speed = 1e9;
-  person_.act = [&] {
+  person_.at_the_stand = [&] {
     speed = std::abs(bench_->simulation().plant().motor().speed);
     EXPECT_FALSE(circuit().output());
   };
-  run_with_person();
+  (void)go(*bench_, *results_);
   EXPECT_LT(speed, 10);
 }
 

@@ -1,6 +1,7 @@
 // The truth log of a simulated bench that has ended: what its motor was told and did, and what its supply did.
 #pragma once
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -19,6 +20,13 @@ struct Account {
   std::vector<Command> commands;
   std::vector<std::pair<double, std::string>> stages;
   std::vector<bool> outputs;  ///< of the supply
+
+  /// The supply was switched, last of all off.
+  [[nodiscard]] bool ends_without_power() const { return !outputs.empty() && !outputs.back(); }
+  /// When the motor began to coast for good; NaN: it does not.
+  [[nodiscard]] double coasts_at() const {
+    return !stages.empty() && stages.back().second == "coast" ? stages.back().first : std::nan("");
+  }
 
   [[nodiscard]] std::string stage_at(double time) const {
     std::string stage = "coast";

@@ -1,21 +1,14 @@
 // A terminal that is blocked blocks nothing but itself: the run goes on and hears its signals, the motor coasts by the
 // simulated motor's own account, and the program ends with its own exit code while the terminal stays blocked.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <poll.h>
-#include <signal.h>
 
 #include <tuple>
 
-#include "drivers/sim/control_line.hpp"
 #include "test/blockable_output.hpp"
-#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
-namespace kphi::test {
-namespace blocked_terminal_test {
+namespace kphi::test::blocked_terminal_test {
 
-using nlohmann::json;
 using std::chrono::seconds;
 using Kind = BlockableOutput::Kind;
 
@@ -31,19 +24,7 @@ class BlockedTerminal {
 
   /// The program, what it says on stderr going to the output.
   [[nodiscard]] std::vector<std::string> command() const {
-    std::vector<std::string> words{"bash", "-c", R"(words=$1; shift; exec "$@" 2>"$words")", "bash", output.path()};
-    for (const std::string& word : bench.run_command()) words.push_back(word);
-    return words;
-  }
-  [[nodiscard]] json status() const { return json::parse(sim::tell(bench.path("control"), "status")); }
-  template <class Holds>
-  [[nodiscard]] bool await(Holds&& holds) const {
-    const auto give_up = std::chrono::steady_clock::now() + kLimit;
-    while (!holds(status())) {
-      if (std::chrono::steady_clock::now() > give_up) return false;
-      ::poll(nullptr, 0, 5);
-    }
-    return true;
+    return by_shell(R"(exec "$@" 2>")" + output.path() + '"', bench.run_command());
   }
 
   RunningBench bench;
@@ -57,26 +38,22 @@ TEST_P(BlockedInARun, StillHearsTheSignalWhileTheMotorTurns) {
   BlockedTerminal blocked(kind, Manner{1, 7000, "  []\n", true});
   write(blocked.bench.path("short.yaml"), short_campaign_text("0", 1, 12));
   Process run(blocked.command());
-  ASSERT_TRUE(blocked.await([](const json& now) { return now["speed_rad_s"] > kTurns; })) << blocked.output.read();
+  ASSERT_TRUE(blocked.bench.await_speed(kTurns)) << blocked.output.read();
   blocked.output.block();
-  const double blocked_at_s = blocked.status()["bench_time_s"];
-  ASSERT_TRUE(blocked.await([&](const json& now) { return now["bench_time_s"] > blocked_at_s + kBlockedFor; }));
-  const double cause_ms = 1e3 * blocked.status()["bench_time_s"].get<double>();
+  const double blocked_at_s = blocked.bench.status()["bench_time_s"];
+  ASSERT_TRUE(blocked.bench.await([&](const auto& now) { return now["bench_time_s"] > blocked_at_s + kBlockedFor; }));
+  const double cause_ms = blocked.bench.time_ms();
   const auto begun = std::chrono::steady_clock::now();
   run.signal(signal_number);
   EXPECT_EQ(run.wait(kLimit), kInterrupted);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
-  blocked.bench.process().signal(SIGTERM);
-  ASSERT_EQ(blocked.bench.process().wait(), 0);
-  const Account account = account_of(bytes_of(blocked.bench.path("wire.jsonl")));
+  const Account account = blocked.bench.account();
   EXPECT_EQ(account.stage_at(cause_ms - 1), "drive") << "the blocked terminal alone stopped the run";
-  ASSERT_EQ(account.stages.back().second, "coast");
-  const double coasts_ms = account.stages.back().first - cause_ms;
+  const double coasts_ms = account.coasts_at() - cause_ms;
   fmt::print("coasts {:.1f} ms after the signal, ends after {:.2f} s\n", coasts_ms, took.count());
   EXPECT_LE(coasts_ms, kPrompt);
   EXPECT_LE(account.last_speed_at() - cause_ms, kPrompt);
-  ASSERT_FALSE(account.outputs.empty());
-  EXPECT_FALSE(account.outputs.back()) << "the supply's output is on";
+  EXPECT_TRUE(account.ends_without_power());
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, BlockedInARun,
@@ -109,7 +86,7 @@ TEST(TerminalThatGoesOn, ShowsWhatWasSaidMeanwhile) {
   write(blocked.bench.path("short.yaml"), short_campaign_text("0", 1, 2));
   blocked.output.block();
   Process run(blocked.command());
-  ASSERT_TRUE(blocked.await([](const json& now) { return now["speed_rad_s"] > kTurns; }));
+  ASSERT_TRUE(blocked.bench.await_speed(kTurns));
   EXPECT_EQ(blocked.output.read(), "");
   blocked.output.resume();
   EXPECT_EQ(run.wait(seconds(60)), 0);
@@ -119,5 +96,4 @@ TEST(TerminalThatGoesOn, ShowsWhatWasSaidMeanwhile) {
   EXPECT_THAT(said, testing::HasSubstr("\nnext: kphi fit ")) << "the last words";
 }
 
-}  // namespace blocked_terminal_test
-}  // namespace kphi::test
+}  // namespace kphi::test::blocked_terminal_test

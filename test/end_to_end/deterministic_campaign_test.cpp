@@ -1,15 +1,10 @@
 // A campaign on the deterministic bench, through the program, twice: the ground on which fault tests stand.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
-#include <map>
+#include "test/end_to_end/program.hpp"
 
-#include "test/daq/bench_fixture.hpp"
-#include "test/end_to_end/process.hpp"
-
-namespace kphi::test {
-namespace deterministic_campaign_test {
+namespace kphi::test::deterministic_campaign_test {
 
 using testing::HasSubstr;
 
@@ -23,16 +18,9 @@ std::map<std::string, std::string> contents(const std::filesystem::path& folder)
 }
 
 std::map<std::string, std::string> campaign_on(const std::string& bench, const std::string& campaign) {
-  const TemporaryFolder folder;
-  const auto path = [&](const char* name) { return (folder.path() / name).string(); };
-  std::ofstream(path("campaign.yaml")) << campaign;
-  std::ofstream(path("bench.yaml")) << bench;
-  Process run(
-      {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
-  EXPECT_EQ(run.wait(), 0) << run.err();
-  Process fit({KPHI_PROGRAM, "fit", run.out().substr(0, run.out().find('\n'))});
-  EXPECT_EQ(fit.wait(), 0) << fit.err();
-  return contents(path("out"));
+  const VirtualCampaign here(campaign, bench);
+  (void)ran({kphi(), "fit", ran(here.command()).folder()});
+  return contents(here.path("out"));
 }
 
 std::map<std::string, std::string> campaign_from(int seed) {
@@ -86,17 +74,11 @@ TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCo
 }
 
 TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStreamAway) {
-  const TemporaryFolder folder;
-  const auto path = [&](const char* name) { return (folder.path() / name).string(); };
-  std::ofstream(path("faults.yaml")) << "format: kphi-faults/1\nfaults:\n  - {at_s: 8, kind: taken_over}\n";
-  std::ofstream(path("campaign.yaml")) << short_campaign_text("0, 90, 180", 2);
-  std::ofstream(path("bench.yaml")) << deterministic_config(5, "faults.yaml").text;  // beside the bench file
-  Process run(
-      {KPHI_PROGRAM, "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")});
-  EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_NE(run.err().find("another client has taken the stream"), std::string::npos) << run.err();
-  EXPECT_NE(run.err().find("1 of 6 runs finished"), std::string::npos) << run.err();
+  const VirtualCampaign here(short_campaign_text("0, 90, 180", 2),
+                             deterministic_config(5, "faults.yaml").text);  // beside the bench file
+  here.write("faults.yaml", "format: kphi-faults/1\nfaults:\n  - {at_s: 8, kind: taken_over}\n");
+  EXPECT_THAT(ran(here.command(), 4).err,
+              testing::AllOf(HasSubstr("another client has taken the stream"), HasSubstr("1 of 6 runs finished")));
 }
 
-}  // namespace deterministic_campaign_test
-}  // namespace kphi::test
+}  // namespace kphi::test::deterministic_campaign_test

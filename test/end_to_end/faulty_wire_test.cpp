@@ -1,20 +1,13 @@
 // The program on a simulated bench whose wire fails by a script: what is recorded equals what truly happened.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <signal.h>
-
-#include <map>
-#include <sstream>
 
 #include "results/run_reader.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
-namespace kphi::test {
-namespace faulty_wire_test {
+namespace kphi::test::faulty_wire_test {
 
 using nlohmann::json;
-using testing::AllOf;
-using testing::HasSubstr;
+using namespace testing;
 
 std::vector<json> lines_of(const std::string& path) {
   std::istringstream text(bytes_of(path));
@@ -41,23 +34,24 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
                             "  - {at_s: 0, for_s: 100000, kind: foreign_source, p: 0.02}\n"
                             "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.02, size: 71}\n"
                             "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
-  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
-  EXPECT_EQ(devices.wait(), 0) << devices.err();
-  EXPECT_GT(json::parse(devices.out())[0]["stream"]["lost_network"], 0);
-  Process run(bench.run_command());
-  ASSERT_EQ(run.wait(), 0) << run.err();
-  bench.process().signal(SIGTERM);
-  EXPECT_EQ(bench.process().wait(), 0);
+  const Ended devices = ran({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
+  EXPECT_GT(json::parse(devices.out)[0]["stream"]["lost_network"], 0);
+  const std::string folder = ran(bench.run_command()).folder();
+  for (const char* verb : {"verify", "replay"}) (void)ran({kphi(), verb, folder});
+  const json info = json::parse(ran({kphi(), "info", "--json", folder}).out);
+  (void)bench.account();
   EXPECT_THAT(bench.process().err(), AllOf(HasSubstr("records_dropped"), HasSubstr("foreign")));
   const std::vector<json> log = lines_of(bench.path("wire.jsonl"));
   EXPECT_EQ(log.front()["event"], "http_charset");
+  const auto totals = std::ranges::find_if(log, [](const json& line) { return line.contains("totals"); });
+  ASSERT_NE(totals, log.end());
   int runs = 0;
-  std::uint64_t lost = 0;
+  std::uint64_t lost = 0, duplicates = 0, malformed = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(bench.path("results"))) {
     if (entry.path().extension() != ".h5") continue;
     const results::RunRecording recording = results::read_run(entry.path());
     ++runs;
-    lost += recording.account.lost_network;
+    lost += recording.account.lost_network + recording.account.lost_host;
     EXPECT_EQ(recording.account.lost_network,
               truly_lost(log, recording.load_cell.front().ft_sequence, recording.load_cell.back().ft_sequence));
     EXPECT_GT(recording.account.duplicates, 0u);
@@ -65,80 +59,58 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   }
   EXPECT_EQ(runs, 3);
   EXPECT_GT(lost, 0u);
+  for (const json& one : info.at("runs")) {
+    lost -= one.at("lost_network").get<std::uint64_t>() + one.at("lost_host").get<std::uint64_t>();
+    duplicates += one.at("duplicates").get<std::uint64_t>();
+    malformed += one.at("malformed").get<std::uint64_t>();
+  }
+  EXPECT_EQ(lost, 0u) << "kphi info tells it";
+  EXPECT_GT(duplicates, 0u);
+  EXPECT_GT(malformed, 0u);
+  // What went wrong before a run's first record and after its last is no part of it.
+  EXPECT_LE(duplicates, totals->at("totals").at("records_duplicated").get<std::uint64_t>());
+  EXPECT_LE(malformed, totals->at("totals").at("malformed").get<std::uint64_t>());
 }
 
 TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
-  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml")});
-  EXPECT_EQ(devices.wait(), 0) << devices.err();
-  EXPECT_THAT(devices.out(), HasSubstr("Pr\uFFFDfstand"));
-  EXPECT_THAT(devices.out() + devices.err(), testing::Not(HasSubstr("\xFC")));
+  const Ended devices = ran({kphi(), "devices", "--bench", bench.path("bench.yaml")});
+  EXPECT_THAT(devices.out, HasSubstr("Pr\uFFFDfstand"));
+  EXPECT_THAT(devices.out + devices.err, Not(HasSubstr("\xFC")));
 }
 
 TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
-  Process run(bench.run_command());
-  EXPECT_EQ(run.wait(), 3) << run.err();
-  EXPECT_THAT(run.err(), AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
+  EXPECT_THAT(ran(bench.run_command(), 3).err, AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
 }
 
 TEST(FaultInjector, OtherUnitsDuringARunAreNoticedAtItsEnd) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
-  Process run(bench.run_command());
-  EXPECT_EQ(run.wait(), 0) << run.err();
-  EXPECT_THAT(run.err(), AllOf(HasSubstr("configuration changed since the run began: units, counts per unit"),
-                               HasSubstr("60 of 60 steps flagged")));
-  const std::string folder = run.out().substr(0, run.out().find('\n'));
-  EXPECT_EQ(bytes_of(folder + "/faults.yaml"), bytes_of(bench.path("faults.yaml")));
+  const Ended run = ran(bench.run_command());
+  EXPECT_THAT(run.err, AllOf(HasSubstr("configuration changed since the run began: units, counts per unit"),
+                             HasSubstr("60 of 60 steps flagged")));
+  EXPECT_EQ(bytes_of(run.folder() + "/faults.yaml"), bytes_of(bench.path("faults.yaml")));
 }
 
-TEST(FaultInjector, AStreamTakenOverEndsTheCampaignWithTheMotorStopped) {
-  RunningBench bench(Manner{4, 7000, "  - {at_s: 24, kind: taken_over}\n"});
-  write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
-  Process run(bench.run_command());
-  EXPECT_EQ(run.wait(), 4) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
-  EXPECT_TRUE(bench.motor_stops());
-}
-
-class BadScript : public testing::Test {
- protected:
-  /// Exit code and words of a simulator that must not start.
-  void refused(const std::vector<std::string>& options, int exit_code, const std::string& words) {
-    write(folder_.path() / "bench.yaml", bench_text(folder_.path(), 49152, 8049, 1));
-    std::vector<std::string> command{kphi(), "sim", (folder_ / "bench.yaml").string(), "--free-ports"};
-    command.insert(command.end(), options.begin(), options.end());
-    Process sim(command);
-    EXPECT_EQ(sim.wait(), exit_code);
-    EXPECT_THAT(sim.err(), HasSubstr(words));
-    EXPECT_EQ(sim.out(), "");
-  }
-  void refused_script(const std::string& text, const std::string& words) {
-    write(folder_.path() / "faults.yaml", text);
-    refused({"--faults", (folder_ / "faults.yaml").string()}, 2, "faults.yaml" + words);
-  }
-  TemporaryFolder folder_;
-};
-
-TEST_F(BadScript, IsRefusedByLineAndColumn) {
-  refused_script("format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n",
-                 ":3:31: unknown fault \"los\" of the load cell; known: loss, gilbert");
-  refused_script("format: kphi-faults/1\nfaults:\n  - at_s: 0\n    kind: reboot\n    down: 1\n",
-                 ":5:11: reboot has no key \"down\"");
-  refused_script("format: kphi-faults/1\nquirks: {axia: 1}\nfaults: []\n", ":2:16: \"1\" is not one of false, true");
-  refused_script("faults: [\n", ":2:1: ");
-}
-
-TEST_F(BadScript, ThatCannotBeReadIsNamed) {
-  refused({"--faults", (folder_ / "none.yaml").string()}, 2,
+TEST(BadScript, OrATruthLogThatCannotBeWrittenIsNamedBeforeTheSimulatorStarts) {
+  const TemporaryFolder folder;
+  write(folder / "bench.yaml", bench_text(folder.path(), 49152, 8049, 1));
+  const auto refused = [&](const char* option, const std::filesystem::path& file, int exit_code, const char* words) {
+    const Ended sim =
+        ran({kphi(), "sim", (folder / "bench.yaml").string(), "--free-ports", option, file.string()}, exit_code);
+    EXPECT_THAT(sim.err, HasSubstr(words));
+    EXPECT_EQ(sim.out, "");
+  };
+  write(folder / "faults.yaml", "format: kphi-faults/1\nfaults:\n  - {at_s: 0, for_s: 1, kind: los}\n");
+  refused("--faults", folder / "faults.yaml", 2,
+          "faults.yaml:3:31: unknown fault \"los\" of the load cell; known: loss, gilbert");
+  write(folder / "faults.yaml", "faults: [\n");
+  refused("--faults", folder / "faults.yaml", 2, "faults.yaml:2:1: ");
+  refused("--faults", folder / "none.yaml", 2,
           "none.yaml: cannot be opened: No such file or directory; check the name");
-  refused({"--faults", folder_.path().string()}, 2, "is a folder; name a file");
+  refused("--faults", folder.path(), 2, "is a folder; name a file");
+  refused("--truth-log", folder / "no/such/log.jsonl", 1, "no/such/log.jsonl");
 }
 
-TEST_F(BadScript, OrATruthLogThatCannotBeWrittenIsRefusedAtTheBeginning) {
-  refused({"--truth-log", (folder_ / "no/such/log.jsonl").string()}, 1, "no/such/log.jsonl");
-}
-
-}  // namespace faulty_wire_test
-}  // namespace kphi::test
+}  // namespace kphi::test::faulty_wire_test

@@ -1,25 +1,17 @@
 // A runner that hangs in the middle of a step, on a bench over its true transports: the guard's thread lets the motor
 // go.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <signal.h>
 
 #include <atomic>
 #include <future>
-#include <thread>
 
 #include "daq/guard/interlock.hpp"
 #include "daq/run/run.hpp"
-#include "drivers/sim/control_line.hpp"
-#include "test/daq/bench_fixture.hpp"
-#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 #include "test/soon.hpp"
 
-namespace kphi::test {
-namespace hanging_runner_test {
+namespace kphi::test::hanging_runner_test {
 
-using nlohmann::json;
 using testing::HasSubstr;
 
 constexpr double kSoonerThanByPause = 300;  // ms; a runner that hangs is let go after 400 ms for that alone
@@ -32,7 +24,6 @@ class HangingRunner : public testing::Test {
   }
   ~HangingRunner() override { release(); }
 
-  [[nodiscard]] json status() const { return json::parse(sim::tell(simulation_.path("control"), "status")); }
   /// Records a run whose runner hangs once the motor turns, until release().
   void record() {
     run_ = std::async(std::launch::async, [this]() -> std::string {
@@ -54,19 +45,14 @@ class HangingRunner : public testing::Test {
     });
   }
   void hang() {
-    ASSERT_TRUE(soon([&] { return status()["speed_rad_s"] > 500.0; }));
+    ASSERT_TRUE(simulation_.await_speed(500));
     turns_ = true;
     ASSERT_TRUE(soon([&] { return hangs_.load(); }));
   }
   void release() {
     if (!std::exchange(released_, true)) go_on_.set_value();
   }
-  [[nodiscard]] bool coasts() const { return status()["drive"]["mode"] == "coast"; }
-  [[nodiscard]] Account account() {
-    simulation_.process().signal(SIGTERM);
-    EXPECT_EQ(simulation_.process().wait(), 0);
-    return account_of(bytes_of(simulation_.path("wire.jsonl")));
-  }
+  [[nodiscard]] bool coasts() const { return simulation_.status()["drive"]["mode"] == "coast"; }
 
   RunningBench simulation_{Manner{1, 7000, "  []\n", true}};
   profiles::Campaign campaign_ = short_campaign();
@@ -90,15 +76,13 @@ TEST_F(HangingRunner, DoesNotKeepTheGuardFromLettingTheMotorGo) {
 TEST_F(HangingRunner, DoesNotKeepTheGuardFromSeeingThatAKnobIsTurned) {
   record();
   hang();
-  const std::string answer = sim::tell(simulation_.path("control"), "fault kind=supply_panel register=9 value=2000");
-  ASSERT_THAT(answer, testing::StartsWith("ok "));
+  const double turned_ms = simulation_.fault("kind=supply_panel register=9 value=2000");
   EXPECT_TRUE(soon([&] { return coasts(); })) << "while the runner hangs";
   release();
   EXPECT_THAT(run_.get(), HasSubstr("changed on the front panel"));
-  const double after_ms = account().stages.back().first - 1e3 * std::stod(answer.substr(3));
+  const double after_ms = simulation_.account().coasts_at() - turned_ms;
   fmt::print("coasts {:.1f} ms after the knob was turned, its runner hanging\n", after_ms);
   EXPECT_LT(after_ms, kSoonerThanByPause);
 }
 
-}  // namespace hanging_runner_test
-}  // namespace kphi::test
+}  // namespace kphi::test::hanging_runner_test

@@ -1,44 +1,22 @@
 // kill -9 at random moments of a campaign in virtual time, as a process: resumed again and again, it ends as if nothing
 // had happened.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 
-#include <chrono>
-#include <map>
 #include <random>
 #include <thread>
 
-#include "results/campaign_folder.hpp"
-#include "test/daq/bench_fixture.hpp"
-#include "test/end_to_end/process.hpp"
+#include "test/end_to_end/program.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::test {
-namespace killed_campaign_test {
+namespace kphi::test::killed_campaign_test {
 
 namespace fs = std::filesystem;
 using Seconds = std::chrono::duration<double>;
 
-const std::string kBench = kphi::test::source_dir() + "/profiles/bench_deterministic.yaml";
 constexpr int kKilled = 128 + SIGKILL;
 
-/// The folder of the one campaign below `out`, once it is there.
-std::optional<results::CampaignFolder> folder_below(const fs::path& out) {
-  std::optional<results::CampaignFolder> found;
-  if (!fs::exists(out)) return found;
-  for (const auto& entry : fs::directory_iterator(out)) {
-    if (fs::exists(entry.path() / "runs")) found = results::CampaignFolder::open(entry.path());
-  }
-  return found;
-}
-
-std::map<std::string, std::string> measured_in(const results::CampaignFolder& folder) {
-  std::map<std::string, std::string> files;
-  for (const auto& run : folder.complete_runs()) files[run.filename().string()] = bytes_of(run);
-  for (const auto& table : {folder.steps(), folder.means()}) files[table.filename().string()] = bytes_of(table);
-  return files;
-}
+std::optional<results::CampaignFolder> folder_below(const fs::path& out) { return campaign_below(out, "runs"); }
 
 std::size_t files_with(const results::CampaignFolder& folder, const std::string& word) {
   std::size_t n = 0;
@@ -50,30 +28,21 @@ std::size_t files_with(const results::CampaignFolder& folder, const std::string&
 class KilledCampaign : public testing::TestWithParam<int> {
  protected:
   void SetUp() override {
-    std::ofstream(folder_ / "campaign.yaml") << short_campaign_text("0, 90, 180", 2, 3);
     const auto begun = std::chrono::steady_clock::now();
-    Process run(command(folder_ / "whole"));
-    ASSERT_EQ(run.wait(), 0) << run.err();
+    const results::CampaignFolder whole = results::CampaignFolder::open(ran(here_.command()).folder());
     whole_takes_ = std::chrono::steady_clock::now() - begun;
-    whole_ = measured_in(*folder_below(folder_ / "whole"));
-    fit_ = coefficients_of(*folder_below(folder_ / "whole"));
-  }
-  [[nodiscard]] std::vector<std::string> command(const fs::path& out) const {
-    std::vector<std::string> words{
-        KPHI_PROGRAM, "run", (folder_ / "campaign.yaml").string(), "--bench", kBench, "--yes", "--out", out.string()};
-    if (const auto begun = folder_below(out)) words.insert(words.end(), {"--resume", begun->path().string()});
-    return words;
+    whole_ = measured_in(whole);
+    fit_ = coefficients_of(whole);
   }
   static std::string coefficients_of(const results::CampaignFolder& folder) {
-    Process fit({KPHI_PROGRAM, "fit", folder.path().string()});
-    EXPECT_EQ(fit.wait(), 0) << fit.err();
+    (void)ran({kphi(), "fit", folder.path().string()});
     return bytes_of(folder.coefficients());
   }
   /// Returns how often it was killed on its way to the end.
   int kill_to_the_end(const fs::path& out, int most) {
     int kills = 0;
     for (bool ended = false; !ended;) {
-      Process run(command(out));
+      Process run(here_.resuming_command(out, "runs"));
       if (kills < most) {
         std::this_thread::sleep_for(whole_takes_ * std::uniform_real_distribution<>(0, 0.4)(random_));
         run.signal(SIGKILL);
@@ -104,9 +73,10 @@ class KilledCampaign : public testing::TestWithParam<int> {
         << "more than the run of the moment is unfinished";
   }
 
-  TemporaryFolder folder_;
+  const VirtualCampaign here_{short_campaign_text("0, 90, 180", 2, 3),
+                              bytes_of(source_dir() + "/profiles/bench_deterministic.yaml")};
   Seconds whole_takes_{0};
-  std::map<std::string, std::string> whole_;
+  Files whole_;
   std::string fit_;
   std::mt19937 random_{20210530};
   std::vector<results::AcceptedRun> accepted_;
@@ -115,7 +85,7 @@ class KilledCampaign : public testing::TestWithParam<int> {
 TEST_P(KilledCampaign, ResumedEachTimeGivesTheRunsTheTablesAndTheFitOfOneThatWasNeverKilled) {
   for (int kills = 0, campaign = 1; kills < GetParam(); ++campaign) {
     SCOPED_TRACE(campaign);
-    const fs::path out = folder_ / ("killed" + std::to_string(campaign));
+    const fs::path out = here_.path("killed" + std::to_string(campaign));
     accepted_.clear();
     const int killed = kill_to_the_end(out, GetParam() - kills);
     if (HasFailure()) return;
@@ -128,13 +98,11 @@ TEST_P(KilledCampaign, ResumedEachTimeGivesTheRunsTheTablesAndTheFitOfOneThatWas
         << "a kill costs one run at most";
     EXPECT_TRUE(measured_in(*folder) == whole_);
     EXPECT_EQ(coefficients_of(*folder), fit_);
-    Process verify({KPHI_PROGRAM, "verify", folder->path().string()});
-    EXPECT_EQ(verify.wait(), 0) << verify.out();
+    (void)ran({kphi(), "verify", folder->path().string()});
     fs::remove_all(out);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Kills, KilledCampaign, testing::Values(KPHI_KILLS));
 
-}  // namespace killed_campaign_test
-}  // namespace kphi::test
+}  // namespace kphi::test::killed_campaign_test

@@ -1,16 +1,13 @@
 // Two programs on one bench, and a campaign that goes on, over the real transports.
 #include <gmock/gmock.h>
-#include <signal.h>
 
 #include "results/campaign_folder.hpp"
 #include "test/end_to_end/running_bench.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::test {
-namespace locks_and_resume_test {
+namespace kphi::test::locks_and_resume_test {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using namespace testing;
 
 std::string folder_of(const RunningBench& bench) {
   return std::filesystem::directory_iterator(bench.path("results"))->path().string();
@@ -27,13 +24,10 @@ TEST(Locks, RefuseASecondProgramAndNameTheFirstWhichIsNotDisturbed) {
   const std::string holder = fmt::format("in use by process {} (", first.pid());
   for (const auto& command :
        {bench.run_command(), std::vector<std::string>{kphi(), "devices", "--bench", bench.path("bench.yaml")}}) {
-    Process second(command);
-    EXPECT_EQ(second.wait(), 3) << second.err();
-    EXPECT_THAT(second.err(), AllOf(HasSubstr(holder), HasSubstr(fmt::format("kill -INT {}", first.pid()))));
+    EXPECT_THAT(ran(command, 3).err, AllOf(HasSubstr(holder), HasSubstr(fmt::format("kill -INT {}", first.pid()))));
   }
-  Process third(resume_command(bench, folder_of(bench)));
-  EXPECT_EQ(third.wait(), 2) << third.err();
-  EXPECT_THAT(third.err(), AllOf(HasSubstr(holder), HasSubstr("wait for it, or stop it with")));
+  EXPECT_THAT(ran(resume_command(bench, folder_of(bench)), 2).err,
+              AllOf(HasSubstr(holder), HasSubstr("wait for it, or stop it with")));
   EXPECT_EQ(first.wait(), 0) << first.err();
 }
 
@@ -46,16 +40,12 @@ TEST(Resume, GoesOnAfterAKillAndSaysSoWhenAllIsDone) {
   EXPECT_EQ(run.wait(), 128 + SIGKILL);
   const std::string folder = folder_of(bench);
 
-  Process resumed(resume_command(bench, folder));
-  EXPECT_EQ(resumed.wait(), 0) << "a dead program's locks are no obstacle: " << resumed.err();
-  EXPECT_THAT(resumed.err(), AllOf(HasSubstr("of 3 runs accepted"), HasSubstr("run  3/3")));
-  Process verify({kphi(), "verify", folder});
-  EXPECT_EQ(verify.wait(), 0) << verify.out();
-
-  Process again(resume_command(bench, folder));
-  EXPECT_EQ(again.wait(), 0);
-  EXPECT_THAT(again.err(), HasSubstr("is finished: all 3 runs accepted"));
-  EXPECT_EQ(again.out(), folder + "\n");
+  EXPECT_THAT(ran(resume_command(bench, folder)).err, AllOf(HasSubstr("of 3 runs accepted"), HasSubstr("run  3/3")))
+      << "a dead program's locks are no obstacle";
+  (void)ran({kphi(), "verify", folder});
+  const Ended again = ran(resume_command(bench, folder));
+  EXPECT_THAT(again.err, HasSubstr("is finished: all 3 runs accepted"));
+  EXPECT_EQ(again.out, folder + "\n");
 }
 
 TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
@@ -69,18 +59,13 @@ TEST(Resume, RefusesAChangedCampaignBeforeAnyDeviceIsAsked) {
   bench.process().signal(SIGKILL);
 
   write(bench.path("other.yaml"), short_campaign_text("0, 90"));
-  auto command = resume_command(bench, folder);
-  command.push_back(bench.path("other.yaml"));
-  Process refused(command);
-  EXPECT_EQ(refused.wait(), 2) << refused.err();
-  EXPECT_THAT(refused.err(), AllOf(HasSubstr("the campaign file has changed"), HasSubstr("--accept-changes")));
+  EXPECT_THAT(ran(joined(resume_command(bench, folder), {bench.path("other.yaml")}), 2).err,
+              AllOf(HasSubstr("the campaign file has changed"), HasSubstr("--accept-changes")));
 }
 
 TEST(Resume, NeedsACampaignOrAFolder) {
-  Process nothing({kphi(), "run", "--bench", kphi::test::source_dir() + "/profiles/bench_deterministic.yaml"});
-  EXPECT_EQ(nothing.wait(), 2);
-  EXPECT_THAT(nothing.err(), HasSubstr("no campaign; give its file, or a folder with --resume"));
+  EXPECT_THAT(ran({kphi(), "run", "--bench", source_dir() + "/profiles/bench_deterministic.yaml"}, 2).err,
+              HasSubstr("no campaign; give its file, or a folder with --resume"));
 }
 
-}  // namespace locks_and_resume_test
-}  // namespace kphi::test
+}  // namespace kphi::test::locks_and_resume_test

@@ -1,47 +1,28 @@
 // The power is cut under a campaign: what its file system's device holds at that moment is copied and mounted anew.
-#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <signal.h>
 #include <unistd.h>
 
-#include <fstream>
-#include <map>
-#include <optional>
 #include <random>
 #include <set>
 
 #include "base/error.hpp"
 #include "daq/campaign/resume.hpp"
 #include "results/run_reader.hpp"
-#include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/mounted_image.hpp"
-#include "test/end_to_end/process.hpp"
+#include "test/end_to_end/program.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::test {
-namespace power_cut_test {
+namespace kphi::test::power_cut_test {
 
 namespace fs = std::filesystem;
-using Files = std::map<std::string, std::string>;
 
 constexpr int kRuns = 6;
 constexpr int kCuts = 8;             // at any write to the device
 constexpr std::size_t kResumed = 3;  // of all copies
 constexpr unsigned kSeed = 20210530;
 
-std::optional<results::CampaignFolder> campaign_below(const fs::path& out) {
-  std::error_code none;
-  for (const auto& entry : fs::directory_iterator(out, none))
-    if (fs::exists(entry.path() / "journal.jsonl")) return results::CampaignFolder::open(entry.path());
-  return std::nullopt;
-}
-
-Files measured_in(const results::CampaignFolder& folder) {
-  Files files;
-  for (const auto& run : folder.complete_runs()) files[run.filename().string()] = bytes_of(run);
-  for (const auto& table : {folder.steps(), folder.means()}) files[table.filename().string()] = bytes_of(table);
-  return files;
-}
+constexpr const char* kBegun = "journal.jsonl";
 
 /// A config where loop devices cost least.
 fs::path memory() { return ::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : fs::temp_directory_path(); }
@@ -62,36 +43,17 @@ class PowerCut : public testing::TestWithParam<std::string> {
     } catch (const MountError& error) {
       GTEST_SKIP() << "no " << GetParam() << " to cut the power of: " << error.what();
     }
-    std::ofstream(folder_ / "campaign.yaml") << short_campaign_text("0, 90, 180", 2, 3);
-    write_bench(true);
   }
-
-  void write_bench(bool durable) {
-    std::string text = bytes_of(source_dir() + "/profiles/bench_deterministic.yaml");
-    if (durable) text += "  durable: true\n";
-    std::ofstream(folder_ / "bench.yaml") << text;
-  }
-
   [[nodiscard]] std::vector<std::string> command(const fs::path& out) const {
-    std::vector<std::string> words{KPHI_PROGRAM,
-                                   "run",
-                                   (folder_ / "campaign.yaml").string(),
-                                   "--bench",
-                                   (folder_ / "bench.yaml").string(),
-                                   "--yes",
-                                   "--out",
-                                   out.string()};
-    if (const auto begun = campaign_below(out)) words.insert(words.end(), {"--resume", begun->path().string()});
-    return words;
+    return here_.resuming_command(out, kBegun);
   }
 
   /// Nobody cuts anything: what is to be there in the end, and how many writes that takes.
   void run_whole() {
     const std::uint64_t before = disk_->writes();
-    Process run(command(disk_->path() / "whole"));
-    ASSERT_EQ(run.wait(), 0) << run.err();
+    const std::string folder = ran(command(disk_->path() / "whole")).folder();
     writes_ = disk_->writes() - before;
-    whole_ = measured_in(*campaign_below(disk_->path() / "whole"));
+    whole_ = measured_in(results::CampaignFolder::open(folder));
     ASSERT_EQ(whole_.size(), kRuns + 2u);
   }
 
@@ -132,7 +94,7 @@ class PowerCut : public testing::TestWithParam<std::string> {
 
   /// How many runs are accepted there, all of them whole.
   static int accepted_in(const fs::path& out) {
-    const auto folder = campaign_below(out);
+    const auto folder = campaign_below(out, kBegun);
     if (!folder) return 0;
     const daq::Resumption found = daq::inspect(*folder, false);  // compares each with its SHA-256
     for (const auto& run : found.state.accepted) {
@@ -143,15 +105,14 @@ class PowerCut : public testing::TestWithParam<std::string> {
   }
 
   void expect_as_if_nothing_had_happened(const fs::path& out) {
-    Process resumed(command(out));
-    ASSERT_EQ(resumed.wait(), 0) << resumed.err();
-    const auto folder = campaign_below(out);
-    EXPECT_TRUE(measured_in(*folder) == whole_);
-    Process verify({KPHI_PROGRAM, "verify", folder->path().string()});
-    EXPECT_EQ(verify.wait(), 0) << verify.out();
+    const std::string folder = ran(command(out)).folder();
+    EXPECT_TRUE(measured_in(results::CampaignFolder::open(folder)) == whole_);
+    (void)ran({kphi(), "verify", folder});
   }
 
-  TemporaryFolder folder_{memory()};
+  const std::string bench_ = bytes_of(source_dir() + "/profiles/bench_deterministic.yaml");
+  const VirtualCampaign here_{short_campaign_text("0, 90, 180", 2, 3), bench_ + "  durable: true\n"};
+  const TemporaryFolder folder_{memory()};
   std::optional<MountedImage> disk_;
   std::uint64_t writes_ = 0;
   Files whole_;
@@ -178,7 +139,7 @@ TEST_P(PowerCut, LosesNoRunThatWasAnnouncedAndTheCampaignGoesOn) {
 }
 
 TEST_P(PowerCut, WouldLoseRunsIfFilesWereNotSynced) {
-  write_bench(false);
+  here_.write("bench.yaml", bench_);
   Process run(command(disk_->path() / "out"));
   run.wait_for(fmt::format("run  {}/{}", kRuns, kRuns));
   cut(run, "at the end");
@@ -194,5 +155,4 @@ TEST_P(PowerCut, WouldLoseRunsIfFilesWereNotSynced) {
 
 INSTANTIATE_TEST_SUITE_P(Of, PowerCut, testing::Values("ext4", "xfs"), [](const auto& kind) { return kind.param; });
 
-}  // namespace power_cut_test
-}  // namespace kphi::test
+}  // namespace kphi::test::power_cut_test

@@ -1,48 +1,33 @@
 // The program as a person types it, against the simulated bench over the real transports.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <netinet/in.h>
-#include <signal.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <array>
 #include <boost/asio.hpp>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "results/run_reader.hpp"
 #include "test/end_to_end/running_bench.hpp"
-#include "test/source_dir.hpp"
+#include "test/profiles/refusals.hpp"
 
-namespace kphi::test {
-namespace program_test {
+namespace kphi::test::program_test {
 
 using nlohmann::json;
-using testing::HasSubstr;
-
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+using namespace testing;
 
 TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith) {
   RunningBench bench({3});  // of the means is asked that they have settled, on an instrumented bench, too
-  Process run(bench.run_command());
-  ASSERT_EQ(run.wait(), 0) << run.err();
-  const std::string folder = first_line(run.out());
-  EXPECT_THAT(run.err(), HasSubstr("0 lost"));
-  EXPECT_THAT(run.err(), HasSubstr("step  4/4"));
-  EXPECT_EQ(run.err().find('\r'), std::string::npos) << "no terminal, no control characters";
-
-  Process verify({kphi(), "verify", folder});
-  EXPECT_EQ(verify.wait(), 0) << verify.out() << verify.err();
-  Process replay({kphi(), "replay", folder});
-  EXPECT_EQ(replay.wait(), 0) << replay.err();
-  EXPECT_EQ(replay.out(), bytes_of(folder + "/steps.csv"));
-
-  Process fit({kphi(), "fit", folder});
-  ASSERT_EQ(fit.wait(), 0) << fit.err();
+  const Ended run = ran(bench.run_command());
+  const std::string folder = run.folder();
+  EXPECT_THAT(run.err, AllOf(HasSubstr("0 lost"), HasSubstr("step  4/4")));
+  EXPECT_THAT(run.err, Not(HasSubstr("\r"))) << "no terminal, no control characters";
+  (void)ran({kphi(), "verify", folder});
+  EXPECT_EQ(ran({kphi(), "replay", folder}).out, bytes_of(folder + "/steps.csv"));
+  (void)ran({kphi(), "fit", folder});
   const YAML::Node found = YAML::LoadFile(folder + "/coefficients.yaml");
   const YAML::Node truth = YAML::LoadFile(bench.path("truth.yaml"));
   const double true_k = truth["propellers"]["5x3"]["K_T"].as<double>();
@@ -50,7 +35,7 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
   EXPECT_TRUE(std::filesystem::exists(folder + "/report.html"));
 
   Process compensate({kphi(), "compensate", "--coefficients", folder + "/coefficients.yaml", "--vehicle",
-                      kphi::test::source_dir() + "/profiles/foldable_drone.yaml"},
+                      profiles::shipped("foldable_drone.yaml")},
                      "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n"
                      "180,180,165.676,180,1.5,1.5,1.5,1.5\n");
   EXPECT_EQ(compensate.wait(), 0) << compensate.err();
@@ -59,9 +44,9 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
 
 TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {
   RunningBench bench;
-  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json", "--clock-gain", "10"});
-  ASSERT_EQ(devices.wait(), 0) << devices.err();
-  const json motor = json::parse(devices.out()).at(1);
+  const std::vector<std::string> command{kphi(),   "devices",      "--bench", bench.path("bench.yaml"),
+                                         "--json", "--clock-gain", "10"};
+  const json motor = json::parse(ran(command).out).at(1);
   EXPECT_EQ(motor.at("uid"), "002300064d4b501120343353");
   EXPECT_EQ(motor.at("firmware"), "speed 0.0.32");
   EXPECT_EQ(motor.at("parameters").at("brushless_drive.volts_limit"), 27.0);
@@ -76,35 +61,13 @@ TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
   Manner manner;
   manner.supply = true;
   RunningBench bench(manner);
-  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
-  ASSERT_EQ(devices.wait(), 0) << devices.err();
-  const json answers = json::parse(devices.out());
+  const std::vector<std::string> command{kphi(), "devices", "--bench", bench.path("bench.yaml")};
+  const json answers = json::parse(ran(joined(command, {"--json"})).out);
   EXPECT_EQ(answers.at(1).at("output"), false);
   EXPECT_EQ(answers.at(2).at("answers"), false) << "its module, which is not missed then";
-  Process measured({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--clock-gain", "10"});
-  EXPECT_EQ(measured.wait(), 3) << "unless its clock is asked for";
-  EXPECT_THAT(measured.out(), HasSubstr("clock not measured: the supply's output is off"));
-}
-
-TEST(Program, StopsOnCtrlCWithTheMotorCoastingAndTheFileKept) {
-  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
-    RunningBench bench;
-    Process run(bench.run_command());
-    run.wait_for("step  2/4");
-    run.signal(signal_number);
-    EXPECT_EQ(run.wait(), 130) << run.err();
-    EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
-    EXPECT_TRUE(bench.motor_stops());
-  }
-}
-
-TEST(Program, LeavesTheMotorStoppedWhenItIsKilled) {
-  RunningBench bench;
-  Process run(bench.run_command());
-  run.wait_for("step  3/4");
-  run.signal(SIGKILL);
-  EXPECT_EQ(run.wait(), 128 + SIGKILL);
-  EXPECT_TRUE(bench.motor_stops()) << "the module's own timeout should have coasted it";
+  EXPECT_THAT(ran(joined(command, {"--clock-gain", "10"}), 3).out,
+              HasSubstr("clock not measured: the supply's output is off"))
+      << "unless its clock is asked for";
 }
 
 TEST(Program, StopsWhenTheBenchVanishesMidRun) {
@@ -114,47 +77,6 @@ TEST(Program, StopsWhenTheBenchVanishesMidRun) {
   bench.process().signal(SIGKILL);
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("this run so far in "));
-}
-
-json info_of(const std::string& path) {
-  Process info({kphi(), "info", "--json", path});
-  EXPECT_EQ(info.wait(), 0) << info.err();
-  return json::parse(info.out());
-}
-
-TEST(Program, AccountsForWhatTheWireLoses) {
-  RunningBench bench({8, 7000,
-                      "  - {at_s: 0, for_s: 100000, kind: loss, p: 0.002}\n"
-                      "  - {at_s: 0, for_s: 100000, kind: duplicate, p: 0.01}\n"
-                      "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.01, size: 37}\n"});
-  write(bench.path("short.yaml"), short_campaign_text("0, 90", 1, 8));
-  Process run(bench.run_command());
-  ASSERT_EQ(run.wait(), 0) << run.err();
-  const std::string folder = first_line(run.out());
-  for (const char* verb : {"verify", "replay"}) {
-    Process again({kphi(), verb, folder});
-    EXPECT_EQ(again.wait(), 0) << again.out() << again.err();
-  }
-  bench.process().signal(SIGTERM);
-  ASSERT_EQ(bench.process().wait(), 0) << bench.process().err();
-  const std::string log = bytes_of(bench.path("wire.jsonl"));
-  const std::size_t totals = log.find("{\"totals\"");
-  ASSERT_NE(totals, std::string::npos) << log.substr(log.size() - std::min<std::size_t>(log.size(), 400));
-  const json truth = json::parse(log.substr(totals, log.find('\n', totals) - totals)).at("totals");
-  std::uint64_t lost = 0, duplicates = 0, malformed = 0;
-  const json info = info_of(folder);
-  for (const json& one : info.at("runs")) {
-    lost += one.at("lost_network").get<std::uint64_t>() + one.at("lost_host").get<std::uint64_t>();
-    duplicates += one.at("duplicates").get<std::uint64_t>();
-    malformed += one.at("malformed").get<std::uint64_t>();
-  }
-  EXPECT_GT(lost, 0u);
-  EXPECT_GT(duplicates, 0u);
-  EXPECT_GT(malformed, 0u);
-  // What went wrong before a run's first record and after its last is no part of it.
-  EXPECT_LE(lost, truth.at("records_dropped").get<std::uint64_t>());
-  EXPECT_LE(duplicates, truth.at("records_duplicated").get<std::uint64_t>());
-  EXPECT_LE(malformed, truth.at("malformed").get<std::uint64_t>());
 }
 
 /// Sends what a second client would send to the box.
@@ -182,24 +104,18 @@ TEST(Program, StopsWhenAnotherClientTakesTheStreamAndSaysSo) {
 TEST(Program, TakesTheBoxesBiasWhenTheCampaignSaysSo) {
   RunningBench bench;
   write(bench.path("short.yaml"), short_campaign_text("0") + "box_bias: true\n");
-  Process run(bench.run_command());
-  ASSERT_EQ(run.wait(), 0) << run.err();
-  const std::string folder = first_line(run.out());
-  const json bias = info_of(folder).at("runs").at(0).at("box_bias");
+  const std::string folder = ran(bench.run_command()).folder();
+  const json bias = json::parse(ran({kphi(), "info", "--json", folder}).out).at("runs").at(0).at("box_bias");
   EXPECT_GT(bias.at("records"), 1000);
   EXPECT_LT(std::abs(bias.at("after").at(2).get<double>()), 0.05);
-  Process replay({kphi(), "replay", folder});
-  EXPECT_EQ(replay.wait(), 0) << replay.err();
+  (void)ran({kphi(), "replay", folder});
 }
 
 TEST(Program, RefusesARateThatFoldsStepsOfTheCampaignAndNamesThem) {
   RunningBench bench({8, 100, "  []\n"});
-  Process devices({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--campaign", bench.path("short.yaml")});
-  EXPECT_EQ(devices.wait(), 0) << devices.err();
-  EXPECT_THAT(devices.out(), HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
-  Process run(bench.run_command());
-  EXPECT_EQ(run.wait(), 2) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("set the RDT output rate to 7000 Hz"));
+  EXPECT_THAT(ran({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--campaign", bench.path("short.yaml")}).out,
+              HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
+  EXPECT_THAT(ran(bench.run_command(), 2).err, HasSubstr("set the RDT output rate to 7000 Hz"));
   EXPECT_TRUE(!std::filesystem::exists(bench.path("results")) || std::filesystem::is_empty(bench.path("results")));
 }
 
@@ -238,111 +154,72 @@ TEST(Program, RefusesABoxThatNamesTwoScales) {
   YAML::Node file = YAML::LoadFile(bench.path("bench.yaml"));
   file["netbox"]["tcp_port"] = other.port();
   write(bench.path("bench.yaml"), YAML::Dump(file) + "\n");
-  Process run(bench.run_command());
-  EXPECT_EQ(run.wait(), 3) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("10000 counts per N"));
+  EXPECT_THAT(ran(bench.run_command(), 3).err, HasSubstr("10000 counts per N"));
 }
 
-class BadInput : public testing::Test {
- protected:
-  BadInput() {
-    write(path("short.yaml"), short_campaign_text());
-    write(path("bench.yaml"), bench_text(folder_.path(), 49999, 49998, 8));
-  }
-  [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  /// Runs and expects the exit code and one clear line that holds `words`.
-  void expect(const std::vector<std::string>& arguments, int exit_code, const std::string& words) {
-    std::vector<std::string> command{kphi()};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    Process process(command);
-    EXPECT_EQ(process.wait(), exit_code) << process.out() << process.err();
-    EXPECT_THAT(process.err(), HasSubstr(words));
-    EXPECT_EQ(process.err().find("terminate"), std::string::npos) << process.err();
-  }
-  TemporaryFolder folder_;
-};
-
-TEST_F(BadInput, NoBox) {
-  expect({"run", path("short.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("r")}, 3, "127.0.0.1");
-}
-
-TEST_F(BadInput, NoModule) {
-  RunningBench bench;
+TEST(BadInput, IsToldInOneClearLine) {
+  const VirtualCampaign here(short_campaign_text());
+  const RunningBench bench;
+  here.write("bench.yaml", bench_text(here.path(""), 49999, 49998, 8));  // no box answers there
   // A box that answers, and a serial line with nobody behind it.
-  std::string text = bytes_of(bench.path("bench.yaml"));
-  const std::size_t device = text.find("/motor");
-  text.replace(device, 6, "/no_motor");
-  write(path("no_module.yaml"), text);
-  expect({"run", path("short.yaml"), "--bench", path("no_module.yaml"), "--yes", "--out", path("r")}, 3, "no_motor");
+  here.write("no_module.yaml", profiles::changed(bytes_of(bench.path("bench.yaml")), "/motor", "/no_motor"));
+  here.write("unit.yaml", profiles::changed(short_campaign_text(), "dwell_s", "dwell_ms"));
+  here.write("fast.yaml",
+             profiles::changed(profiles::changed(short_campaign_text(), "last_rpm: 18000", "last_rpm: 25000"),
+                               "speed_max_rpm: 19100", "speed_max_rpm: 25000"));
+  const std::string bad_bench = here.path("bench.yaml");
+  const auto run = [&](const char* campaign, const std::string& on) -> std::vector<std::string> {
+    return {"run", here.path(campaign), "--bench", on, "--yes", "--out", here.path("r")};
+  };
+  const struct {
+    std::vector<std::string> arguments;
+    int exit_code;
+    const char* words;
+  } kInputs[] = {
+      {run("campaign.yaml", bad_bench), 3, "127.0.0.1"},
+      {run("campaign.yaml", here.path("no_module.yaml")), 3, "no_motor"},
+      {run("unit.yaml", bad_bench), 2, "unit.yaml:7:21: dwell_ms is not a key of profile"},
+      {run("fast.yaml", bad_bench), 2, "19300"},
+      {run("nothing.yaml", bad_bench), 2, "nothing.yaml"},
+      {{"fit", here.path("nothing")}, 2, "nothing"},
+      {{"check", here.path("nothing.yaml")}, 2, "nothing.yaml"},
+      {{"run", here.path("campaign.yaml"), "--bench", bad_bench}, 2, "--yes"},
+      {{"runn"}, 2, "did you mean \"run\""},
+      {{"run", "--fast"}, 2, "--help"},
+  };
+  for (const auto& [arguments, exit_code, words] : kInputs)
+    EXPECT_THAT(ran(joined({kphi()}, arguments), exit_code).err, AllOf(HasSubstr(words), Not(HasSubstr("terminate"))));
 }
 
-TEST_F(BadInput, WrongUnit) {
-  std::string text = short_campaign_text();
-  text.replace(text.find("dwell_s"), 7, "dwell_ms");
-  write(path("unit.yaml"), text);
-  expect({"run", path("unit.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2,
-         "unit.yaml:7:21: dwell_ms is not a key of profile");
-}
-
-TEST_F(BadInput, CampaignAboveTheMotorsLimit) {
-  std::string text = short_campaign_text();
-  text.replace(text.find("last_rpm: 18000"), 15, "last_rpm: 25000");
-  text.replace(text.find("speed_max_rpm: 19100"), 20, "speed_max_rpm: 25000");
-  write(path("fast.yaml"), text);
-  expect({"run", path("fast.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "19300");
-}
-
-TEST_F(BadInput, UnreadableFile) {
-  expect({"run", path("nothing.yaml"), "--bench", path("bench.yaml"), "--yes"}, 2, "nothing.yaml");
-  expect({"fit", path("nothing")}, 2, "nothing");
-  expect({"check", path("nothing.yaml")}, 2, "nothing.yaml");
-}
-
-TEST_F(BadInput, NobodyToAskForMountings) {
-  expect({"run", path("short.yaml"), "--bench", path("bench.yaml")}, 2, "--yes");
-}
-
-TEST_F(BadInput, MisspeltCommand) { expect({"runn"}, 2, "did you mean \"run\""); }
-
-TEST_F(BadInput, UnknownOption) { expect({"run", "--fast"}, 2, "--help"); }
-
-TEST_F(BadInput, FullDiskMidRunKeepsWhatWasWritten) {
+TEST(Program, KeepsWhatWasWrittenBeforeTheDiskWasFull) {
   RunningBench bench;
-  // A file may not grow beyond 2.5 MB: the first run needs about 5.
-  std::vector<std::string> command{"bash", "-c", "trap '' XFSZ; ulimit -f 2500; exec \"$@\"", "bash"};
-  const auto run_command = bench.run_command();
-  command.insert(command.end(), run_command.begin(), run_command.end());
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 20));
-  Process run(command);
-  EXPECT_EQ(run.wait(), 1) << run.err();
+  // A file may not grow beyond 2.5 MB: the first run needs about 5.
+  const Ended run = ran(by_shell(R"(trap '' XFSZ; ulimit -f 2500; exec "$@")", bench.run_command()), 1);
   EXPECT_TRUE(bench.motor_stops());
   std::filesystem::path left;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(bench.path("results"))) {
     if (entry.path().string().find(".h5") != std::string::npos) left = entry.path();
   }
-  ASSERT_FALSE(left.empty()) << run.err();
+  ASSERT_FALSE(left.empty()) << run.err;
   EXPECT_GT(results::read_run(left).load_cell.size(), 20'000u) << left;
 }
 
 TEST(Check, TakesEveryShippedFile) {
-  for (const auto& entry : std::filesystem::directory_iterator(kphi::test::source_dir() + "/profiles")) {
+  for (const auto& entry : std::filesystem::directory_iterator(profiles::shipped(""))) {
     if (entry.path().extension() != ".yaml") continue;
-    Process check({kphi(), "check", entry.path().string()});
-    EXPECT_EQ(check.wait(), 0) << check.err();
+    (void)ran({kphi(), "check", entry.path().string()});
   }
 }
 
 TEST(DryRun, PrintsThePlanAndTouchesNoDevice) {
-  const std::string profiles = kphi::test::source_dir() + "/profiles/";
-  Process run({kphi(), "run", profiles + "icra2021_5in_3blade.yaml", "--bench", profiles + "bench_lab.yaml",
-               "--dry-run", "--json"});
-  EXPECT_EQ(run.wait(), 0) << run.err();
-  const json plan = json::parse(run.out());
+  const json plan = json::parse(ran({kphi(), "run", profiles::shipped("icra2021_5in_3blade.yaml"), "--bench",
+                                     profiles::shipped("bench_lab.yaml"), "--dry-run", "--json"})
+                                    .out);
   EXPECT_EQ(plan.at("runs"), 15);
   EXPECT_EQ(plan.at("steps"), 600);
   EXPECT_EQ(plan.at("mountings"), 5);
   EXPECT_EQ(plan.at("spinning_s"), 1200.0);
 }
 
-}  // namespace program_test
-}  // namespace kphi::test
+}  // namespace kphi::test::program_test

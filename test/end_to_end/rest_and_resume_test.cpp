@@ -1,22 +1,15 @@
 // Nobody is asked to come near a rotor that turns or a motor that has power, and nothing starts again by itself after a
 // safety stop: the program beside the simulated bench, over the real transports.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <signal.h>
 
-#include "drivers/sim/control_line.hpp"
-#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 #include "test/end_to_end/terminal.hpp"
+#include "test/profiles/refusals.hpp"
 #include "test/soon.hpp"
 
-namespace kphi::test {
-namespace rest_and_resume_test {
+namespace kphi::test::rest_and_resume_test {
 
-using testing::AllOf;
-using testing::ContainsRegex;
-using testing::HasSubstr;
-using testing::Not;
+using namespace testing;
 
 constexpr double kRpm = 60 / (2 * 3.14159265358979);
 constexpr double kStandstill = 5;  // rad/s
@@ -24,43 +17,29 @@ constexpr double kStandstill = 5;  // rad/s
 class Stand {
  public:
   explicit Stand(bool supply, const std::string& faults = "  []\n") : bench({1, 7000, faults, supply}) {
-    std::string text = short_campaign_text("0, 90", 1, 3);
-    const std::string::size_type last = text.find("last_rpm: 18000");
-    text.replace(last, 15, "last_rpm: 15000");
-    write(bench.path("short.yaml"), text);
+    limit_thrust("20");
   }
-  [[nodiscard]] nlohmann::json status() const {
-    return nlohmann::json::parse(sim::tell(bench.path("control"), "status"));
+  void limit_thrust(const std::string& newtons) const {
+    using profiles::changed;
+    const std::string text = changed(short_campaign_text("0, 90", 1, 3), "last_rpm: 18000", "last_rpm: 15000");
+    write(bench.path("short.yaml"), changed(text, "thrust_max_n: 20", "thrust_max_n: " + newtons));
   }
-  [[nodiscard]] double speed() const { return std::abs(status()["speed_rad_s"].get<double>()); }
+  [[nodiscard]] double speed() const { return std::abs(bench.status()["speed_rad_s"].get<double>()); }
   [[nodiscard]] std::string folder() const {
     for (const auto& campaign : std::filesystem::directory_iterator(bench.path("results")))
       return campaign.path().string();
     throw std::runtime_error("no campaign was begun: " + words);
   }
   [[nodiscard]] std::vector<std::string> command(const std::vector<std::string>& more) const {
-    std::vector<std::string> all{kphi(), "run", "--bench", bench.path("bench.yaml")};
-    all.insert(all.end(), more.begin(), more.end());
-    return in_real_time(all);
+    return in_real_time(joined({kphi(), "run", "--bench", bench.path("bench.yaml")}, more));
   }
   [[nodiscard]] std::vector<std::string> first(const std::vector<std::string>& more) const {
-    std::vector<std::string> all = command({bench.path("short.yaml"), "--out", bench.path("results")});
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+    return joined(command({bench.path("short.yaml"), "--out", bench.path("results")}), more);
   }
   /// A campaign that a limit of its own stops in its first run.
   void stop_by_the_guard() {
-    std::string text = bytes_of(bench.path("short.yaml"));
-    text.replace(text.find("thrust_max_n: 20"), 16, "thrust_max_n: 1");
-    write(bench.path("short.yaml"), text);
-    Process run(first({"--yes"}));
-    EXPECT_EQ(run.wait(), 4) << run.err();
-    words = run.err();
-  }
-  [[nodiscard]] Account account() {
-    bench.process().signal(SIGTERM);
-    EXPECT_EQ(bench.process().wait(), 0) << bench.process().err();
-    return account_of(bytes_of(bench.path("wire.jsonl")));
+    limit_thrust("1");
+    words = ran(first({"--yes"}), 4).err;
   }
 
   RunningBench bench;
@@ -82,8 +61,8 @@ class AfterAKill : public testing::TestWithParam<bool> {
 
 TEST_P(AfterAKill, TheNextProgramWaitsForStandstillBeforeAnythingIsMounted) {
   kill_the_program();
-  Process resumed(stand_.command({"--yes", "--resume", stand_.folder()}));
-  EXPECT_EQ(resumed.wait(), 0) << "the simulated bench refuses a mounting while its rotor turns: " << resumed.err();
+  // The simulated bench refuses a mounting while its rotor turns.
+  (void)ran(stand_.command({"--yes", "--resume", stand_.folder()}));
 }
 
 TEST_P(AfterAKill, NobodyIsAskedToComeNearATurningRotor) {
@@ -95,10 +74,8 @@ TEST_P(AfterAKill, NobodyIsAskedToComeNearATurningRotor) {
   EXPECT_THAT(resumed.err(), HasSubstr(GetParam() ? "the supply's output is off" : "the motor HAS POWER"));
   resumed.signal(SIGINT);
   EXPECT_EQ(resumed.wait(), 130);
-  if (!GetParam()) return;
-  const Account account = stand_.account();
-  ASSERT_FALSE(account.outputs.empty());
-  EXPECT_FALSE(account.outputs.back());
+  const Account account = stand_.bench.account();
+  EXPECT_EQ(account.ends_without_power(), GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, AfterAKill, testing::Bool(), [](const testing::TestParamInfo<bool>& supply) {
@@ -112,7 +89,7 @@ TEST(Signal, WhileConnectingIsHeardBeforeAnythingIsSwitchedOn) {
   run.signal(SIGINT);
   EXPECT_EQ(run.wait(), 130) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("STOPPED: stopped by request before anything was switched on"));
-  const Account account = stand.account();
+  const Account account = stand.bench.account();
   EXPECT_EQ(std::count(account.outputs.begin(), account.outputs.end(), true), 0);
 }
 
@@ -141,45 +118,36 @@ TEST(SafetyStop, IsClearedOnlyByAPersonsOwnWord) {
   live.erase(simulation, live.find('\n', simulation) + 1 - simulation);
   write(stand.bench.path("live.yaml"), live);
   const auto resume = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words{kphi(),     "run",          "--bench",         stand.bench.path("live.yaml"),
-                                   "--resume", stand.folder(), "--accept-changes"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+    return joined({kphi(), "run", "--bench", stand.bench.path("live.yaml"), "--resume", stand.folder()}, more);
   };
-  Process agreed(resume({"--yes"}));
-  EXPECT_EQ(agreed.wait(), 2) << "never --yes alone on a live bench";
-  EXPECT_THAT(agreed.err(), AllOf(HasSubstr("a safety stop ended this campaign: thrust "), HasSubstr("is above 1 N")));
+  EXPECT_THAT(ran(resume({"--accept-changes", "--yes"}), 2).err,
+              AllOf(HasSubstr("a safety stop ended this campaign: thrust "), HasSubstr("is above 1 N")))
+      << "never --yes alone on a live bench";
 
   write(stand.bench.path("answers.yaml"), "format: kphi-answers/1\nmountings: [0, 90]\n");
-  Process answered(resume({"--answers", stand.bench.path("answers.yaml")}));
-  EXPECT_EQ(answered.wait(), 2);
-  EXPECT_THAT(answered.err(), HasSubstr("add continue_after_safety_stop: true"));
+  EXPECT_THAT(ran(resume({"--accept-changes", "--answers", stand.bench.path("answers.yaml")}), 2).err,
+              HasSubstr("add continue_after_safety_stop: true"));
 
   const Terminal terminal;
-  Process asked(resume({}), {}, {{}, terminal.descriptor()});
+  Process asked(resume({"--accept-changes"}), {}, {{}, terminal.descriptor()});
   asked.wait_for("A safety stop ended this campaign: thrust ");
   terminal.type("q");
   EXPECT_EQ(asked.wait(), 130) << asked.err();
-  EXPECT_EQ(stand.account().last_speed_at() > 0, true) << "of the first run";
+  EXPECT_EQ(stand.bench.account().last_speed_at() > 0, true) << "of the first run";
 }
 
 TEST(SafetyStop, IsClearedByTheAnswersFileOnceAndNotBeforeItHappened) {
   Stand stand(false);
   write(stand.bench.path("answers.yaml"),
         "format: kphi-answers/1\nmountings: [0, 90]\ncontinue_after_safety_stop: true\n");
-  Process early(stand.first({"--answers", stand.bench.path("answers.yaml")}));
-  EXPECT_EQ(early.wait(), 2);
-  EXPECT_THAT(early.err(), HasSubstr("continue_after_safety_stop is not needed"));
+  const std::vector<std::string> answers{"--answers", stand.bench.path("answers.yaml")};
+  EXPECT_THAT(ran(stand.first(answers), 2).err, HasSubstr("continue_after_safety_stop is not needed"));
 
   stand.stop_by_the_guard();
-  std::string text = bytes_of(stand.bench.path("short.yaml"));
-  text.replace(text.find("thrust_max_n: 1"), 15, "thrust_max_n: 20");
-  write(stand.bench.path("short.yaml"), text);
-  Process resumed(stand.command({stand.bench.path("short.yaml"), "--resume", stand.folder(), "--accept-changes",
-                                 "--answers", stand.bench.path("answers.yaml")}));
-  EXPECT_EQ(resumed.wait(), 0) << resumed.err();
+  stand.limit_thrust("20");
+  (void)ran(
+      stand.command(joined({stand.bench.path("short.yaml"), "--resume", stand.folder(), "--accept-changes"}, answers)));
   EXPECT_THAT(bytes_of(std::filesystem::path(stand.folder()) / "journal.jsonl"), HasSubstr("cleared_safety_stop"));
 }
 
-}  // namespace rest_and_resume_test
-}  // namespace kphi::test
+}  // namespace kphi::test::rest_and_resume_test

@@ -2,26 +2,18 @@
 #pragma once
 
 #include <fcntl.h>
-#include <fmt/format.h>
-#include <gtest/gtest.h>
+#include <poll.h>
+#include <signal.h>
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "base/descriptor.hpp"
-#include "test/daq/bench_fixture.hpp"
-#include "test/end_to_end/process.hpp"
-#include "test/temporary_folder.hpp"
+#include "drivers/sim/control_line.hpp"
+#include "test/end_to_end/account.hpp"
+#include "test/end_to_end/program.hpp"
 
 namespace kphi::test {
-
-inline std::string kphi() { return KPHI_PROGRAM; }
-
-inline void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
 /// `more`: further lines of the file.
 inline std::string bench_text(const std::filesystem::path& folder, int rdt_port, int http_port, double time_scale,
@@ -67,17 +59,40 @@ class RunningBench {
     write(folder_.path() / "short.yaml", short_campaign_text("0, 45, 180"));
   }
   [[nodiscard]] std::string path(const std::string& name) const { return (folder_.path() / name).string(); }
-  [[nodiscard]] std::string status() const {
-    Process asked({kphi(), "sim", path("bench.yaml"), "--status"});
-    EXPECT_EQ(asked.wait(), 0) << asked.err();
-    return asked.out();
+  [[nodiscard]] nlohmann::json status() const { return nlohmann::json::parse(sim::tell(path("control"), "status")); }
+  [[nodiscard]] double time_ms() const { return 1e3 * status()["bench_time_s"].get<double>(); }
+  /// Waits until the status is such; whether it came to that.
+  template <class Holds>
+  [[nodiscard]] bool await(Holds&& holds, std::chrono::seconds limit = std::chrono::seconds(20)) const {
+    const auto give_up = std::chrono::steady_clock::now() + limit;
+    while (!holds(status())) {
+      if (std::chrono::steady_clock::now() > give_up) return false;
+      ::poll(nullptr, 0, 5);
+    }
+    return true;
+  }
+  [[nodiscard]] bool await_speed(double rad_s) const {
+    return await([=](const nlohmann::json& now) { return now["speed_rad_s"] > rad_s; });
+  }
+  /// Makes a fault begin at once; when that was, in ms of the bench.
+  [[nodiscard]] double fault(const std::string& words) const {
+    const std::string answer = sim::tell(path("control"), "fault " + words);
+    EXPECT_EQ(answer.substr(0, 3), "ok ") << answer;
+    return 1e3 * std::stod(answer.substr(3));
   }
   /// Waits until the simulated motor turns slower than it would on any command of the campaign.
   [[nodiscard]] bool motor_stops() const {
     for (int asked = 0; asked < 400; ++asked) {
-      if (std::abs(nlohmann::json::parse(status()).at("speed_rad_s").get<double>()) < 5.0) return true;
+      const auto said = nlohmann::json::parse(ran({kphi(), "sim", path("bench.yaml"), "--status"}).out);
+      if (std::abs(said.at("speed_rad_s").get<double>()) < 5.0) return true;
     }
     return false;
+  }
+  /// Ends it: what its motor was told and did.
+  [[nodiscard]] Account account() {
+    process_.signal(SIGTERM);
+    EXPECT_EQ(process_.wait(), 0) << process_.err();
+    return account_of(bytes_of(path("wire.jsonl")));
   }
   [[nodiscard]] std::vector<std::string> run_command() const { return in_real_time(run_command_at_any_priority()); }
   [[nodiscard]] std::vector<std::string> run_command_at_any_priority() const {

@@ -2,12 +2,10 @@
 // turn reaches the module after the waking, the run ends as a safety stop that names the sleep, what was recorded is
 // kept, and the campaign goes on.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "test/end_to_end/sleeping_host.hpp"
 
-namespace kphi::test {
-namespace sleep_test {
+namespace kphi::test::sleep_test {
 
 using testing::ContainsRegex;
 
@@ -134,5 +132,4 @@ INSTANTIATE_TEST_SUITE_P(ByNight, SleepingComputer, testing::ValuesIn(rows(true)
 INSTANTIATE_TEST_SUITE_P(ByDay, SleepingComputer, testing::ValuesIn(rows(false)), name_in_suite);
 #endif
 
-}  // namespace sleep_test
-}  // namespace kphi::test
+}  // namespace kphi::test::sleep_test

@@ -3,7 +3,7 @@
 // that ran out in the kernel meanwhile waits for what is left of it.
 //
 // The file that KPHI_SLEPT names is 8 bytes: the nanoseconds slept so far. Whoever stops the program writes them before
-// it goes on, see slept_time.hpp. Without the variable nothing has slept.
+// it goes on, see sleeping_host.hpp. Without the variable nothing has slept.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>

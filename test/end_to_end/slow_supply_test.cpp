@@ -1,16 +1,12 @@
 // A supply as slow as stock firmware, 10 answers a second over a true pseudo-terminal, some of them so late that nobody
 // waits for them any more, beside 7000 load-cell samples a second over true UDP.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
 
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
-namespace kphi::test {
-namespace slow_supply_test {
+namespace kphi::test::slow_supply_test {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr double kTimeout = 0.5;  // s: what the driver waits for an answer
@@ -54,5 +50,4 @@ TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
   EXPECT_GT(longest, static_cast<std::int64_t>(kTimeout * kSecond)) << "no answer was late: this test showed nothing";
 }
 
-}  // namespace slow_supply_test
-}  // namespace kphi::test
+}  // namespace kphi::test::slow_supply_test

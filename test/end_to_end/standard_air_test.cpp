@@ -1,6 +1,5 @@
 // One simulated propeller in thin and in dense air, each through campaign, recording, reduction and identification: the
 // coefficients differ as the air does, those in standard air not at all.
-#include <gtest/gtest.h>
 
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
@@ -9,9 +8,9 @@
 #include "results/campaign_folder.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/profiles/refusals.hpp"
 
-namespace kphi::test {
-namespace standard_air_test {
+namespace kphi::test::standard_air_test {
 
 /// Pa, at 20 °C and half the humidity that the air can hold.
 double pressure_of(double kg_m3) {
@@ -36,24 +35,19 @@ sim::BenchSettings quiet() {
 }
 
 profiles::BenchConfig place_in(double kg_m3) {
-  std::string text = deterministic_config(5).text;
-  const std::string seed = "seed: 5";
-  text.replace(text.find(seed), seed.size(), fmt::format("{}, air_density_kg_m3: {}", seed, kg_m3));
-  text += fmt::format(
+  const std::string text =
+      profiles::changed(deterministic_config(5).text, "seed: 5", fmt::format("seed: 5, air_density_kg_m3: {}", kg_m3));
+  const std::string air = fmt::format(
       "ambient: {{manual: {{temperature_c: 20, pressure_pa: {}, relative_humidity: 0.5, u_temperature_c: 0.1, "
       "u_pressure_pa: 10, u_relative_humidity: 0.01}}}}\n",
       pressure_of(kg_m3));
-  return profiles::parse_bench(text, "bench.yaml");
+  return profiles::parse_bench(text + air, "bench.yaml");
 }
 
 profiles::Campaign patient_campaign() {
-  std::string text = short_campaign_text("0, 90, 180", 1, 3);
-  const auto replace = [&](const std::string& from, const std::string& to) {
-    text.replace(text.find(from), from.size(), to);
-  };
-  replace("dwell_s: 0.6", "dwell_s: 2.5");
-  replace("minimum_discard_s: 0.3", "minimum_discard_s: 2");
-  return profiles::parse_campaign(text, "patient.yaml");
+  const std::string text = profiles::changed(short_campaign_text("0, 90, 180", 1, 3), "dwell_s: 0.6", "dwell_s: 2.5");
+  return profiles::parse_campaign(profiles::changed(text, "minimum_discard_s: 0.3", "minimum_discard_s: 2"),
+                                  "patient.yaml");
 }
 
 fit::Identification identified_in(double kg_m3) {
@@ -82,5 +76,4 @@ TEST(StandardAir, GivesTheSamePropellerTheSameCoefficientsInAnyAir) {
   }
 }
 
-}  // namespace standard_air_test
-}  // namespace kphi::test
+}  // namespace kphi::test::standard_air_test

@@ -1,20 +1,15 @@
 // The program on a bench whose supply and sensor of the air are on USB: true libusb in the program, simulated devices
 // on a virtual bus that it inherits from this test.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <poll.h>
 
 #include "drivers/ambient/air.hpp"
-#include "drivers/sim/control_line.hpp"
 #include "drivers/sim/usb/mcp2221.hpp"
 #include "results/run_reader.hpp"
 #include "test/drivers/sim_equipment/usbtmc.hpp"
 #include "test/drivers/usb/virtual_bus.hpp"
-#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
-namespace kphi::test {
-namespace usb_bench_test {
+namespace kphi::test::usb_bench_test {
 
 using testing::HasSubstr;
 
@@ -47,8 +42,8 @@ class UsbBench : public OnVirtualBus {
     ADD_FAILURE() << "no file ..." << ending;
     return {};
   }
-  [[nodiscard]] nlohmann::json status() const {
-    return nlohmann::json::parse(sim::tell(bench->path("control"), "status"));
+  [[nodiscard]] Ended devices(const char* file, int exit_code = 0) const {
+    return ran({kphi(), "devices", "--bench", bench->path(file)}, exit_code);
   }
 
   sim::TrueAir truth{21.37, 98'765, 0.43};
@@ -59,34 +54,26 @@ class UsbBench : public OnVirtualBus {
 };
 
 TEST_F(UsbBench, IsListedWithWhoIsThereAndWhatItShows) {
-  Process devices({kphi(), "devices", "--bench", bench->path("usb.yaml")});
-  EXPECT_EQ(devices.wait(), 0) << devices.out() << devices.err();
-  EXPECT_THAT(devices.out(), HasSubstr("supply scpi-usb:1209:5c91: answers\n  SIM3010"));
-  EXPECT_THAT(devices.out(), HasSubstr("ambient usb:04d8:00dd:0001: answers\n  BME280"));
-  EXPECT_THAT(devices.out(), HasSubstr("21.37 °C, 987.6 hPa, 43.0 % humidity: air 1.16"));
+  EXPECT_THAT(devices("usb.yaml").out, testing::AllOf(HasSubstr("supply scpi-usb:1209:5c91: answers\n  SIM3010"),
+                                                      HasSubstr("ambient usb:04d8:00dd:0001: answers\n  BME280"),
+                                                      HasSubstr("21.37 °C, 987.6 hPa, 43.0 % humidity: air 1.16")));
 }
 
 TEST_F(UsbBench, ListsWhatTheBenchFileDoesNotName) {
-  Process devices({kphi(), "devices", "--bench", bench->path("bench.yaml")});
-  EXPECT_EQ(devices.wait(), 0) << devices.out() << devices.err();
-  EXPECT_THAT(devices.out(), HasSubstr("SCPI scpi-usb:1209:5c91:SN0001: answers\n  KPHI,SIM3010,SN0001,1.00"));
-  EXPECT_THAT(devices.out(), HasSubstr("ambient usb:04d8:00dd:0001: answers\n  BME280"));
+  EXPECT_THAT(devices("bench.yaml").out,
+              testing::AllOf(HasSubstr("SCPI scpi-usb:1209:5c91:SN0001: answers\n  KPHI,SIM3010,SN0001,1.00"),
+                             HasSubstr("ambient usb:04d8:00dd:0001: answers\n  BME280")));
 }
 
 TEST_F(UsbBench, SaysWhatIsMissingAndExitsWithThree) {
   wire->unplug(kSensorSocket);
-  Process devices({kphi(), "devices", "--bench", bench->path("usb.yaml")});
-  EXPECT_EQ(devices.wait(), 3) << devices.out() << devices.err();
-  EXPECT_THAT(devices.out(), HasSubstr("ambient usb:04d8:00dd:0001: does not answer\n"));
-  Process run(run_command());
-  EXPECT_EQ(run.wait(), 3) << run.err();
-  EXPECT_THAT(run.err(), HasSubstr("04d8:00dd"));
+  EXPECT_THAT(devices("usb.yaml", 3).out, HasSubstr("ambient usb:04d8:00dd:0001: does not answer\n"));
+  EXPECT_THAT(ran(run_command(), 3).err, HasSubstr("04d8:00dd"));
   EXPECT_FALSE(instrument.state().output);
 }
 
 TEST_F(UsbBench, RecordsPowerAndAir) {
-  Process run(run_command());
-  ASSERT_EQ(run.wait(), 0) << run.err();
+  (void)ran(run_command());
   const results::RunRecording kept = recording("rep1.h5");
   const auto air = ambient::density_of({truth.temperature_c, truth.pressure_pa, truth.relative_humidity, 0, 0, 0});
   EXPECT_NEAR(kept.header.air_density_kg_m3, air.kg_m3, 1e-4);
@@ -104,16 +91,13 @@ TEST_F(UsbBench, RecordsPowerAndAir) {
 TEST_F(UsbBench, CoastsWithinAFifthOfASecondWhenTheSupplyIsPulledOut) {
   Process run(run_command());
   run.wait_for("step  1/");
-  const double cause_ms = 1e3 * status()["bench_time_s"].get<double>();
+  const double cause_ms = bench->time_ms();
   wire->unplug(kSupplySocket);
   EXPECT_EQ(run.wait(), 4) << run.err();
   EXPECT_THAT(run.err(), HasSubstr("supply"));
-  bench->process().signal(SIGTERM);
-  EXPECT_EQ(bench->process().wait(), 0);
-  const Account account = account_of(bytes_of(bench->path("wire.jsonl")));
+  const Account account = bench->account();
   EXPECT_EQ(account.stage_at(cause_ms), "drive");
-  EXPECT_EQ(account.stages.back().second, "coast");
-  EXPECT_LE(account.stages.back().first - cause_ms, kPrompt) << run.err();
+  EXPECT_LE(account.coasts_at() - cause_ms, kPrompt) << run.err();
   const results::RunRecording kept = recording("aborted.h5");
   EXPECT_GT(kept.load_cell.size(), 3000u);
   EXPECT_THAT(kept.outcome_reason, HasSubstr("supply"));
@@ -122,5 +106,4 @@ TEST_F(UsbBench, CoastsWithinAFifthOfASecondWhenTheSupplyIsPulledOut) {
   EXPECT_THAT(kept.events.back().text, HasSubstr("step 2"));
 }
 
-}  // namespace usb_bench_test
-}  // namespace kphi::test
+}  // namespace kphi::test::usb_bench_test

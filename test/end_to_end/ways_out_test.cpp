@@ -2,19 +2,12 @@
 // cause; where nothing that the program says reaches the module, within the module's own timeout and 100 ms. Where the
 // bench has a supply, its output is off in the end, unless the program was killed.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <poll.h>
-#include <signal.h>
 #include <sys/resource.h>
 
-#include "drivers/sim/control_line.hpp"
-#include "test/end_to_end/account.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
-namespace kphi::test {
-namespace ways_out_test {
+namespace kphi::test::ways_out_test {
 
-using nlohmann::json;
 using testing::ContainsRegex;
 
 constexpr double kPrompt = 200;                // ms
@@ -32,10 +25,8 @@ struct Scene {
   Process& run;
   const char* supply_fault;
   double& cause_ms;
-  [[nodiscard]] json status() const { return json::parse(sim::tell(bench.path("control"), "status")); }
   void await_coast() const {
-    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-    while (status()["drive"]["mode"] != "coast" && std::chrono::steady_clock::now() < give_up) ::poll(nullptr, 0, 5);
+    (void)bench.await([](const auto& now) { return now["drive"]["mode"] == "coast"; }, std::chrono::seconds(10));
   }
 };
 
@@ -58,16 +49,10 @@ void fill_the_disk(const Scene& scene) {
 
 /// In the middle of the step of 19,100 RPM, when the speed has settled.
 void let_the_supply_fail(const Scene& scene) {
-  const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  const auto await = [&](auto&& holds) {
-    while (!holds(scene.status()) && std::chrono::steady_clock::now() < give_up) ::poll(nullptr, 0, 5);
-  };
-  await([](const json& now) { return now["speed_rad_s"] > kFullSpeed; });
-  const double reached_s = scene.status()["bench_time_s"];
-  await([&](const json& now) { return now["bench_time_s"] > reached_s + 0.4; });
-  const std::string answer = sim::tell(scene.bench.path("control"), std::string("fault ") + scene.supply_fault);
-  ASSERT_THAT(answer, testing::StartsWith("ok "));
-  scene.cause_ms = 1e3 * std::stod(answer.substr(3));
+  (void)scene.bench.await_speed(kFullSpeed);
+  const double settles_s = scene.bench.status()["bench_time_s"].get<double>() + 0.4;
+  (void)scene.bench.await([&](const auto& now) { return now["bench_time_s"] > settles_s; });
+  scene.cause_ms = scene.bench.fault(scene.supply_fault);
 }
 
 void close_the_pipes(const Scene& scene) { scene.run.close_pipes(); }
@@ -110,6 +95,7 @@ constexpr Way of_supply(const char* name, const char* fault, const char* words, 
 constexpr auto kDeed = Cause::deed;
 constexpr auto kScript = Cause::script;
 constexpr auto kEnd = Cause::end_of_steps;
+constexpr const char* kStoppedAndKept = "stopped by request.*this run so far in ";
 const Way kWays[] = {
     {"NormalEnd", kEnd, nullptr, "", 0, "next: kphi fit"},
     of_supply("SupplyOverVoltage", "kind=supply_trip code=1", "over-voltage protection switched the output off"),
@@ -118,10 +104,10 @@ const Way kWays[] = {
     of_supply("SupplySagsALittle", "kind=supply_sag volts=0.8 for_s=1000", "below the 12 V set"),
     of_supply("MainsFail", "kind=supply_sag volts=12 for_s=1000", ""),
     of_supply("SupplyUnplugged", "kind=supply_closed for_s=1000", "supply", false),
-    {"Interrupt", kDeed, send<SIGINT>, "", 130, "stopped by request"},
+    {"Interrupt", kDeed, send<SIGINT>, "", 130, kStoppedAndKept},
     {"InterruptTwice", kDeed, send<SIGINT, SIGINT>, "", 130, "stopped by request"},
-    {"Terminate", kDeed, send<SIGTERM>, "", 130, "stopped by request"},
-    {"HangUp", kDeed, send<SIGHUP>, "", 130, "stopped by request"},
+    {"Terminate", kDeed, send<SIGTERM>, "", 130, kStoppedAndKept},
+    {"HangUp", kDeed, send<SIGHUP>, "", 130, kStoppedAndKept},
     {"QuitKey", kDeed, send<SIGQUIT>, "", 130, "stopped by request"},
     {"NobodyReads", kEnd, close_the_pipes, "", 0, ""},
     {"DiskFull", kDeed, fill_the_disk, "", 1, "File too large"},
@@ -173,22 +159,18 @@ Outcome take(const Way& way, double fault_at_s) {
   RunningBench bench(
       {1, 7000, fault.empty() ? "  []\n" : fmt::format("  - {{at_s: {}, {}}}\n", fault_at_s, fault), way.has_supply()});
   write(bench.path("short.yaml"), campaign_text(way));
-  std::vector<std::string> command{"bash", "-c", "ulimit -c 0; exec \"$@\"", "bash"};
-  for (const std::string& word : bench.run_command()) command.push_back(word);
-  Process run(command);
+  Process run(by_shell(R"(ulimit -c 0; exec "$@")", bench.run_command()));
   Outcome outcome;
   const Scene scene{bench, run, way.supply_fault, outcome.cause_ms};
   if (way.deed != nullptr) {
     run.wait_for("step  1/");
-    outcome.cause_ms = 1e3 * scene.status()["bench_time_s"].get<double>();
+    outcome.cause_ms = bench.time_ms();
     way.deed(scene);
   }
   outcome.exit_code = run.wait();
   outcome.words = run.err();
   scene.await_coast();
-  bench.process().signal(SIGTERM);
-  EXPECT_EQ(bench.process().wait(), 0) << bench.process().err();
-  outcome.account = account_of(bytes_of(bench.path("wire.jsonl")));
+  outcome.account = bench.account();
   if (way.cause == Cause::script) outcome.cause_ms = 1e3 * fault_at_s;
   if (way.cause == Cause::end_of_steps)
     outcome.cause_ms = way.has_supply() ? outcome.account.coast_told_at() : outcome.account.last_speed_at() + 1;
@@ -212,9 +194,7 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
   const Outcome outcome = take_while_spinning(way);
   const Account& account = outcome.account;
   ASSERT_TRUE(outcome.spun_before()) << outcome.words;
-  ASSERT_EQ(account.stages.back().second, "coast") << outcome.words;
-
-  const double coasts_ms = account.stages.back().first - outcome.cause_ms;
+  const double coasts_ms = account.coasts_at() - outcome.cause_ms;
   const double told_ms = account.last_speed_at() - outcome.cause_ms;
   fmt::print("{:<16} coasts {:6.1f} ms after the cause; wanted {:.0f} ms\n", way.name, coasts_ms, way.limit_ms);
   EXPECT_LE(coasts_ms, way.limit_ms) << outcome.words;
@@ -225,13 +205,11 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
   }
   EXPECT_THAT(outcome.words, ContainsRegex(way.words));
   if (way.has_supply() && way.switchable && outcome.exit_code < kKilledBy) {
-    ASSERT_FALSE(account.outputs.empty());
-    EXPECT_FALSE(account.outputs.back()) << "the supply's output is on\n" << outcome.words;
+    EXPECT_TRUE(account.ends_without_power()) << outcome.words;
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, WaysOut, testing::ValuesIn(kWays),
                          [](const testing::TestParamInfo<Way>& way) { return std::string(way.param.name); });
 
-}  // namespace ways_out_test
-}  // namespace kphi::test
+}  // namespace kphi::test::ways_out_test

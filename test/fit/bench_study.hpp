@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <random>
 
 #include "fit/uncertainty/analysis.hpp"
@@ -14,7 +13,7 @@
 namespace kphi::fit {
 
 struct StudyTruth {
-  CampaignTruth line;           ///< at standard density
+  CampaignTruth line{};         ///< at standard density
   double bend = 0;              ///< of k(φ): a parabola that adds bend · K_T at half the range
   double rise = 0;              ///< of k from the lowest to the highest speed, as a share
   double between_runs = 0.003;  ///< mounting, bearing: deviation as a share of k
@@ -51,17 +50,9 @@ inline StudyCampaign study_campaign(const StudyTruth& truth, unsigned seed) {
       double slow = 0, before = 0;
       for (int i = 0; i < 40; ++i) {
         const double part = (i + 0.5) / 40;
-        results::StepMean step;
-        step.propeller = "5x3";
-        step.blades = 3;
-        step.diameter_in = 5;
-        step.occlusion_deg = phi;
-        step.repetition = repetition;
-        step.step = i;
-        step.commanded_speed_rad_s = from_rpm(100 + 19000.0 * i / 39).value();
+        results::StepMean step = step_at(phi, repetition, i);
         const double speed = step.commanded_speed_rad_s * (1 + 2e-4 * normal(random));
         step.speed_rad_s = speed / clock;
-        step.speed_n = 100;
         const double share = speed / from_rpm(19100).value();
         const double held = run_k * (1 + truth.rise * (share - 0.5)) * speed * speed;
         // Means over 1 s from 1 s after the command: what the lag has left by then.
@@ -72,7 +63,6 @@ inline StudyCampaign study_campaign(const StudyTruth& truth, unsigned seed) {
         step.thrust_n = calibration * (held + late + noise) + zero_error;
         step.zero_n = 0.3 + moved * part;
         step.thrust_sd_n = std::hypot(0.05, 0.02 * held);
-        step.thrust_samples = 7000;
         step.torque_nm = -0.013 * held;
         step.torque_sd_nm = 1e-3;
         step.air_density_kg_m3 = campaign.measured_density;
@@ -111,12 +101,10 @@ struct Coverage {
 
 inline std::map<std::string, Coverage> coverage_study(const StudyTruth& truth, unsigned campaigns,
                                                       Estimator estimator = Estimator::through_origin) {
-  IdentificationOptions how;
-  how.estimator = estimator;
   std::map<std::string, Coverage> table;
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
     const StudyCampaign campaign = study_campaign(truth, seed);
-    const Identification found = identify(campaign.steps, how);
+    const Identification found = identify(campaign.steps, {.estimator = estimator});
     const Analysis analysis = analyse(found, study_options(truth));
     const double air = campaign.density / kStandardDensity;
     for (std::size_t i = 0; i < found.table.size(); ++i) {
@@ -162,11 +150,6 @@ inline BentCount count_bent(const StudyTruth& truth, unsigned campaigns) {
 }
 
 /// Real propellers of 5 inch rise by 11 to 21 %.
-inline StudyTruth bent_truth() {
-  StudyTruth bent;
-  bent.bend = 0.03;
-  bent.rise = 0.15;
-  return bent;
-}
+inline StudyTruth bent_truth() { return {.bend = 0.03, .rise = 0.15}; }
 
 }  // namespace kphi::fit

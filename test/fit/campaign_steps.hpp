@@ -19,6 +19,21 @@ struct CampaignTruth {
   [[nodiscard]] double k(double phi_deg) const { return phi_deg == 0 ? K_T : intercept + slope_per_deg * phi_deg; }
 };
 
+/// Step `i` of 40 from 100 to 19100 RPM of the propeller 5x3, without what was measured.
+[[nodiscard]] inline results::StepMean step_at(double phi, int repetition, int i) {
+  results::StepMean step;
+  step.propeller = "5x3";
+  step.blades = 3;
+  step.diameter_in = 5;
+  step.occlusion_deg = phi;
+  step.repetition = repetition;
+  step.step = i;
+  step.commanded_speed_rad_s = from_rpm(100 + 19000.0 * i / 39).value();
+  step.speed_n = 100;
+  step.thrust_samples = 7000;
+  return step;
+}
+
 /// 40 steps from 100 to 19100 RPM, five angles, three repetitions: the paper's campaign.
 [[nodiscard]] inline std::vector<results::StepMean> campaign_steps(const CampaignTruth& truth = {}, unsigned seed = 1) {
   std::mt19937 random(seed);
@@ -27,19 +42,10 @@ struct CampaignTruth {
   for (const double phi : {0.0, 45.0, 90.0, 180.0, 270.0}) {
     for (int repetition = 1; repetition <= 3; ++repetition) {
       for (int i = 0; i < 40; ++i) {
-        results::StepMean step;
-        step.propeller = "5x3";
-        step.blades = 3;
-        step.diameter_in = 5;
-        step.occlusion_deg = phi;
-        step.repetition = repetition;
-        step.step = i;
-        step.commanded_speed_rad_s = from_rpm(100 + 19000.0 * i / 39).value();
+        results::StepMean step = step_at(phi, repetition, i);
         step.speed_rad_s = step.commanded_speed_rad_s * (1 + 2e-4 * noise(random));
-        step.speed_n = 100;
         step.thrust_n = truth.k(phi) * step.speed_rad_s * step.speed_rad_s + truth.noise_n * noise(random);
         step.thrust_sd_n = 0.05;
-        step.thrust_samples = 7000;
         steps.push_back(step);
       }
     }

@@ -4,9 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "base/error.hpp"
 #include "daq/campaign/campaign_run.hpp"
@@ -22,22 +20,16 @@ namespace four_propellers_test {
 
 using ::testing::HasSubstr;
 
-void replace(std::string& text, const std::string& from, const std::string& to) {
-  ASSERT_NE(text.find(from), std::string::npos) << from;
-  text.replace(text.find(from), from.size(), to);
-}
-
 /// 8 steps of 0.8 s, twice, instead of 40 of 2 s three times.
 profiles::Campaign shortened(const std::string& name) {
-  std::ifstream file(test::source_dir() + "/profiles/" + name + ".yaml");
-  std::stringstream all;
-  all << file.rdbuf();
-  std::string text = all.str();
-  replace(text, "repetitions: 3", "repetitions: 2\nrepetitions_extra_max: 0");
-  replace(text, "steps: 40", "steps: 8");
-  replace(text, "dwell_s: 2.0", "dwell_s: 0.8");
-  replace(text, "zero_s: 2.0", "zero_s: 1.0");
-  replace(text, "minimum_discard_s: 1.0", "minimum_discard_s: 0.4");
+  std::string text = test::bytes_of(test::source_dir() + "/profiles/" + name + ".yaml");
+  for (const auto& [from, to] :
+       {std::pair<std::string, const char*>("repetitions: 3", "repetitions: 2\nrepetitions_extra_max: 0"),
+        {"steps: 40", "steps: 8"},
+        {"dwell_s: 2.0", "dwell_s: 0.8"},
+        {"zero_s: 2.0", "zero_s: 1.0"},
+        {"minimum_discard_s: 1.0", "minimum_discard_s: 0.4"}})
+    text.replace(text.find(from), from.size(), to);
   return profiles::parse_campaign(text, name);
 }
 
@@ -49,12 +41,11 @@ Fitted measured(const std::string& name, int seed) {
   daq::AutoConfirmOperator person;
   daq::Progress silence;
   (void)daq::run_campaign(bench, shortened(name), config, results, person, silence, [] { return false; });
-  Fitted member;
-  member.identification = identify(results::read_steps(results.steps()));
+  Identification found = identify(results::read_steps(results.steps()));
   AnalysisOptions options;
   options.bench.motor_clock = 2e-4;
-  member.analysis = analyse(member.identification, options);
-  return member;
+  Analysis analysis = analyse(found, options);
+  return {std::move(found), std::move(analysis)};
 }
 
 const std::vector<Fitted>& four() {
@@ -67,17 +58,15 @@ void expect_the_papers_statements() {
   const FamilyFindings findings = findings_of(four(), {});
   const std::string table = family_text(findings);
   fmt::print("{}", table);
-  std::map<std::string, double> truth;
-  const auto& p52 = *sim::find_propeller("5x2");
-  const auto& p53 = *sim::find_propeller("5x3");
-  const auto& p62 = *sim::find_propeller("6x2");
-  const auto& p63 = *sim::find_propeller("6x3");
-  truth["share_45"] = sim::thrust_coefficient(p53, 45) / sim::thrust_coefficient(p53, 0);
-  truth["share_270"] = sim::thrust_coefficient(p53, 270) / sim::thrust_coefficient(p53, 0);
-  truth["slopes_5in"] = p53.line_slope_n_rpm2_deg / p52.line_slope_n_rpm2_deg;
-  truth["slopes_6in"] = p63.line_slope_n_rpm2_deg / p62.line_slope_n_rpm2_deg;
-  truth["offset_5in"] = p53.thrust_n_rpm2 - p52.thrust_n_rpm2;
-  truth["offset_6in"] = p63.thrust_n_rpm2 - p62.thrust_n_rpm2;
+  const auto &p52 = *sim::find_propeller("5x2"), &p53 = *sim::find_propeller("5x3"), &p62 = *sim::find_propeller("6x2"),
+             &p63 = *sim::find_propeller("6x3");
+  const std::map<std::string, double> truth{
+      {"share_45", sim::thrust_coefficient(p53, 45) / sim::thrust_coefficient(p53, 0)},
+      {"share_270", sim::thrust_coefficient(p53, 270) / sim::thrust_coefficient(p53, 0)},
+      {"slopes_5in", p53.line_slope_n_rpm2_deg / p52.line_slope_n_rpm2_deg},
+      {"slopes_6in", p63.line_slope_n_rpm2_deg / p62.line_slope_n_rpm2_deg},
+      {"offset_5in", p53.thrust_n_rpm2 - p52.thrust_n_rpm2},
+      {"offset_6in", p63.thrust_n_rpm2 - p62.thrust_n_rpm2}};
   std::size_t tested = 0;
   for (const Claim& claim : findings.claims) {
     EXPECT_EQ(claim.verdict, Verdict::holds) << claim.id << ": " << claim.value;

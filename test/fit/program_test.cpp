@@ -101,8 +101,7 @@ TEST_F(Program, ComparesAFamilyFromItsFolders) {
   const std::vector<std::string> places{steps("5x2", 1, 5, 2, 0.76), steps("5x3", 2), steps("6x2", 3, 6, 2, 1.55),
                                         steps("6x3", 4, 6, 3, 1.85)};
   for (const auto& config : places) ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
-  std::vector<std::string> words{"compare"};
-  words.insert(words.end(), places.begin(), places.end());
+  std::vector<std::string> words{"compare", places[0], places[1], places[2], places[3]};
   const Answer table = kphi(words);
   EXPECT_EQ(table.code, 0) << table.err;
   EXPECT_THAT(table.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));

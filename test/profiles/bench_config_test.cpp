@@ -16,6 +16,13 @@ std::vector<std::string> refused(const std::string& from, const std::string& to)
   return refusals([&] { return parse_bench(changed(kBenchText, from, to), "b.yaml"); });
 }
 
+/// The shortest bench file, and more.
+std::string with_power(const std::string& more) {
+  return "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
+         "thrust_axis: +Fz\n" +
+         more;
+}
+
 TEST(BenchConfig, IsReadWhole) {
   const BenchConfig bench = parse_bench(kBenchText, "b.yaml");
   EXPECT_EQ(bench.name, "bench");
@@ -42,10 +49,7 @@ TEST(BenchConfig, IsReadWhole) {
 }
 
 TEST(BenchConfig, NeedsOnlyAddressesAxisAndSpeedLimit) {
-  const BenchConfig bench = parse_bench(
-      "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
-      "thrust_axis: +Fz\n",
-      "b.yaml");
+  const BenchConfig bench = parse_bench(with_power(""), "b.yaml");
   EXPECT_EQ(bench.netbox.rdt_port, 49152);
   EXPECT_EQ(bench.netbox.http_port, 80);
   EXPECT_EQ(bench.netbox.rate_hz, 7000);
@@ -57,6 +61,8 @@ TEST(BenchConfig, NeedsOnlyAddressesAxisAndSpeedLimit) {
   EXPECT_EQ(bench.iq.spin, +1);
   EXPECT_EQ(bench.iq.telemetry_hz, 50);
   EXPECT_FALSE(bench.simulation);
+  EXPECT_FALSE(bench.supply);
+  EXPECT_FALSE(bench.ambient.known());
 }
 
 TEST(BenchConfig, KnowsSixThrustAxes) {
@@ -72,27 +78,48 @@ TEST(BenchConfig, KnowsSixThrustAxes) {
 }
 
 TEST(BenchConfig, EachMistakeEarnsItsRefusal) {
-  expect_refusals(refused,
-                  {// Holds ports and identifiers
-                   {"50000", "0", "5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"},
-                   {"8080", "65536", "6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"},
-                   {"module_id: 7", "module_id: 63", "12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"},
-                   {"module_id: 7", "module_id: -1", "12:14: iq.module_id: -1 is below 0…"},
-                   {"datagram: 20", "datagram: 41", "8:25: netbox.records_per_datagram: 41 is above 40…"},
-                   {"3500", "7001", "7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"},
-                   // Simulates in process without a control line only
-                   {"  control: /tmp/control\n", "",
-                    "18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"},
-                   {"  control: /tmp/control\n", "  in_process: true\n", ""},
-                   {"seed: 5", "seed: -5", "19:9: simulation.seed: -5 is below 0…"},
-                   {"time_scale: 20", "time_scale: 0", "18:15: simulation.time_scale: 0 is below 0.1…"},
-                   {"  seed: 5\n", "  in_process: yes\n", "19:15: yes is a boolean to some…"},
-                   // Names the key that was meant
-                   {"  baud:", "  baud_rate:", "11:3: baud_rate is not a key of iq; known here: baud,…"},
-                   {"rdt_port", "rtd_port", "5:3: rtd_port is not a key of netbox; did you mean rdt_port?"},
-                   {"speed_max_rpm", "speed_max_rad_s",
-                    "15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
-                    "the value in RPM"}});
+  expect_refusals(
+      refused,
+      {// Holds ports and identifiers
+       {"50000", "0", "5:13: netbox.rdt_port: 0 is below 1; write a value from 1 to 65535"},
+       {"8080", "65536", "6:14: netbox.http_port: 65536 is above 65535; write a value from 1 to 65535"},
+       {"module_id: 7", "module_id: 63", "12:14: iq.module_id: 63 is above 62; write a value from 0 to 62"},
+       {"module_id: 7", "module_id: -1", "12:14: iq.module_id: -1 is below 0…"},
+       {"datagram: 20", "datagram: 41", "8:25: netbox.records_per_datagram: 41 is above 40…"},
+       {"3500", "7001", "7:12: netbox.rate_hz: 7001 is above 7000 Hz; write a value from 1 to 7000 Hz"},
+       // Simulates in process without a control line only
+       {"  control: /tmp/control\n", "",
+        "18:3: simulation: control is missing; add control: a path for the socket, or in_process: true"},
+       {"  control: /tmp/control\n", "  in_process: true\n", ""},
+       {"seed: 5", "seed: -5", "19:9: simulation.seed: -5 is below 0…"},
+       {"time_scale: 20", "time_scale: 0", "18:15: simulation.time_scale: 0 is below 0.1…"},
+       {"  seed: 5\n", "  in_process: yes\n", "19:15: yes is a boolean to some…"},
+       // Refuses settings of the box that contradict or do not exist
+       {"iq:\n", "  settings: {rate_hz: 7000}\niq:\n",
+        "9:23: netbox.settings.rate_hz: 7000 contradicts the 3500 of netbox.rate_hz; write the same, or remove "
+        "netbox.rate_hz"},
+       {"iq:\n", "  settings: {filter_hz: 100}\niq:\n", "9:25: netbox.settings.filter_hz: 100 is not allowed…"},
+       {"iq:\n", "  settings: {configuration: 16}\niq:\n", "9:29: netbox.settings.configuration: 16 is above 15…"},
+       {"iq:\n", "  settings: {comnetip: 1}\niq:\n", "9:14: comnetip is not a key of netbox.settings…"},
+       // Wants a device that is a path and a host that is a name
+       {"/dev/ttyUSB0", "ttyUSB0",
+        "10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /, or "
+        "usb:VID:PID[:SERIAL][@PORT] with four hexadecimal digits or * each"},
+       {"/dev/ttyUSB0", "usb:403:6001", "10:11: iq.device: text…"},
+       {"/dev/ttyUSB0", "usb:0403:6001@here", "10:11: iq.device: text…"},
+       {"/dev/ttyUSB0", "usb:0403:6001", ""},
+       {"/dev/ttyUSB0", "usb:0403:6001:A10K0000", ""},
+       {"/dev/ttyUSB0", "usb:*:*:A10K0000", ""},
+       {"/dev/ttyUSB0", "usb:1a86:7523@1-4.2", ""},
+       {"/dev/ttyUSB0", "usb:1a86:7523@1-4.2:1.0", ""},
+       {"192.168.1.1", "\"http://192.168.1.1\"", "4:9: netbox.host: text \"http://192.168.1.1\" does not fit…"},
+       {"192.168.1.1", "\"::1\"", ""},
+       // Names the key that was meant
+       {"  baud:", "  baud_rate:", "11:3: baud_rate is not a key of iq; known here: baud,…"},
+       {"rdt_port", "rtd_port", "5:3: rtd_port is not a key of netbox; did you mean rdt_port?"},
+       {"speed_max_rpm", "speed_max_rad_s",
+        "15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
+        "the value in RPM"}});
 }
 
 TEST(BenchConfig, KnowsWhereTheBoxSpeaksTcp) {
@@ -111,20 +138,6 @@ TEST(BenchConfig, SaysWhatTheBoxIsToBeSetTo) {
   const BenchConfig alone =
       parse_bench(changed(kBenchText, "  rate_hz: 3500\n", "  settings: {rate_hz: 1000}\n"), "b.yaml");
   EXPECT_EQ(alone.netbox.rate_hz, 1000) << "what is set is expected";
-}
-
-TEST(BenchConfig, RefusesSettingsThatContradictOrDoNotExist) {
-  const auto with = [](const std::string& settings) {
-    return refused("iq:\n", "  settings: {" + settings + "}\niq:\n");
-  };
-  EXPECT_THAT(
-      with("rate_hz: 7000"),
-      ElementsAre("9:23: netbox.settings.rate_hz: 7000 contradicts the 3500 of netbox.rate_hz; write the same, or "
-                  "remove netbox.rate_hz"));
-  EXPECT_THAT(with("filter_hz: 100"), ElementsAre(StartsWith("9:25: netbox.settings.filter_hz: 100 is not allowed")));
-  EXPECT_THAT(with("configuration: 16"),
-              ElementsAre(StartsWith("9:29: netbox.settings.configuration: 16 is above 15")));
-  EXPECT_THAT(with("comnetip: 1"), ElementsAre(StartsWith("9:14: comnetip is not a key of netbox.settings")));
 }
 
 TEST(BenchConfig, FindsItsFaultScriptBesideItself) {
@@ -150,21 +163,6 @@ TEST(BenchConfig, SpinsOneWayOrTheOther) {
   EXPECT_THAT(refused("spin: -1", "spin: +1"), IsEmpty());
   for (const char* spin : {"0", "2", "-1.5", "\"+1\""})
     EXPECT_EQ(refused("spin: -1", std::string("spin: ") + spin).size(), 1u) << spin;
-}
-
-TEST(BenchConfig, WantsADeviceThatIsAPathAndAHostThatIsAName) {
-  EXPECT_THAT(refused("/dev/ttyUSB0", "ttyUSB0"),
-              ElementsAre("10:11: iq.device: text \"ttyUSB0\" does not fit; write a path that begins with /, or "
-                          "usb:VID:PID[:SERIAL][@PORT] with four hexadecimal digits or * each"));
-  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:403:6001"), ElementsAre(StartsWith("10:11: iq.device: text")));
-  EXPECT_THAT(refused("/dev/ttyUSB0", "usb:0403:6001@here"), ElementsAre(StartsWith("10:11: iq.device: text")));
-  for (const char* fine : {"usb:0403:6001", "usb:0403:6001:A10K0000", "usb:*:*:A10K0000", "usb:1a86:7523@1-4.2",
-                           "usb:1a86:7523@1-4.2:1.0"}) {
-    EXPECT_THAT(refused("/dev/ttyUSB0", fine), IsEmpty()) << fine;
-  }
-  EXPECT_THAT(refused("192.168.1.1", "\"http://192.168.1.1\""),
-              ElementsAre(StartsWith("4:9: netbox.host: text \"http://192.168.1.1\" does not fit")));
-  EXPECT_THAT(refused("192.168.1.1", "\"::1\""), IsEmpty());
 }
 
 TEST(BenchConfig, MayKnowTheGainOfTheModulesClock) {
@@ -258,12 +256,6 @@ TEST(BenchConfig, WantsAirByHandWholeWithUncertaintiesAndInItsUnits) {
   EXPECT_EQ(refused_air("ambient: {}\n").size(), 1u);
 }
 
-std::string with_power(const std::string& more) {
-  return "format: kphi-bench/1\nname: b\nnetbox: {host: netbox.lab}\niq: {device: /dev/ttyS1, speed_max_rpm: 9000}\n"
-         "thrust_axis: +Fz\n" +
-         more;
-}
-
 constexpr const char* kSupply =
     "supply: {uri: \"modbus-rtu:/dev/ttyUSB1?model=RD6018\", voltage_v: 12, current_limit_a: 17, over_voltage_v: 14, "
     "over_current_a: 18}\n";
@@ -276,12 +268,6 @@ TEST(BenchConfig, KnowsTheSupply) {
   EXPECT_EQ(bench.supply->current_limit, Amperes(17));
   EXPECT_EQ(bench.supply->over_voltage, Volts(14));
   EXPECT_EQ(bench.supply->over_current, Amperes(18));
-}
-
-TEST(BenchConfig, HasNoSupplyAndKnowsNoAirUnlessTheFileSaysSo) {
-  const BenchConfig bench = parse_bench(with_power(""), "b.yaml");
-  EXPECT_FALSE(bench.supply);
-  EXPECT_FALSE(bench.ambient.known());
 }
 
 TEST(BenchConfig, RefusesASupplyThatWouldTripAtOnce) {

@@ -128,29 +128,6 @@ TEST(ShippedFiles, DescribeTheFoldableDrone) {
   EXPECT_EQ(vehicle.shapes.at("T")[0], from_degrees(90));
 }
 
-/// With these the flights of the README and of the tests are flown.
-TEST(ShippedFiles, TellWhatTheFoldableDroneIsMadeOfAndHowItIsControlled) {
-  const Vehicle vehicle = load_vehicle(shipped("foldable_drone.yaml"));
-  ASSERT_TRUE(vehicle.dynamics && vehicle.control);
-  EXPECT_EQ(vehicle.dynamics->mass_kg, 0.60);
-  EXPECT_EQ(vehicle.dynamics->hub_mass_kg, 0.045);
-  EXPECT_EQ(vehicle.dynamics->body_height_m, 0.040);
-  EXPECT_EQ(vehicle.dynamics->yaw_arm_m, 0.0133);
-  EXPECT_EQ(vehicle.dynamics->rotor_lag_s, 0.033);
-  EXPECT_EQ(vehicle.dynamics->air_drag_per_s, 0.3);
-  EXPECT_EQ(vehicle.dynamics->morph_s, 1.5);
-  EXPECT_THAT(vehicle.dynamics->spin, testing::ElementsAre(1, -1, 1, -1));
-  EXPECT_THAT(vehicle.control->gains.position, testing::ElementsAre(6, 6, 15)) << "15: the paper's Table II";
-  EXPECT_THAT(vehicle.control->gains.velocity, testing::ElementsAre(4, 4, 6)) << "6: the paper's Table II";
-  EXPECT_THAT(vehicle.control->gains.attitude, testing::ElementsAre(8.5, 8.5, 5));
-  EXPECT_THAT(vehicle.control->gains.rate, testing::ElementsAre(12.7, 12.7, 5));
-  EXPECT_EQ(vehicle.control->gains.torque_weight, 0.5);
-  EXPECT_THAT(vehicle.control->gains.position_error_max, testing::ElementsAre(0.6, 0.6, 0.3));
-  EXPECT_THAT(vehicle.control->gains.velocity_error_max, testing::ElementsAre(1.0, 1.0, 0.75));
-  EXPECT_EQ(vehicle.control->gains.smallest_collective, 1.0);
-  EXPECT_EQ(vehicle.control->assured_yaw, 0.02);
-}
-
 TEST(Schemas, AreEmbeddedAsTheyLieInTheFolder) {
   for (const FileKindInfo& kind : kFileKinds) {
     const auto file = read_text(shipped(std::string("schema/") + kind.word + ".schema.json"));

@@ -68,11 +68,8 @@ TEST(StrictYaml, KnowsThePlaceOfEveryValueAndKey) {
   EXPECT_EQ(value_at("/b/c/1/no/such"), std::pair(3, 11)) << "the nearest value around it";
 }
 
-TEST(StrictYaml, CountsColumnsInCharacters) {
+TEST(StrictYaml, CountsColumnsInCharactersAndLinesOfCarriageReturnFiles) {
   EXPECT_THAT(finding_of("{φφφ: ü, b: no}"), HasSubstr("1:13: no is a boolean"));
-}
-
-TEST(StrictYaml, CountsLinesOfCarriageReturnFiles) {
   EXPECT_THAT(finding_of("a: 1\r\nb: 2\r\nc: 010\r\n"), HasSubstr("3:4: 010 looks octal"));
 }
 
@@ -132,12 +129,11 @@ TEST(StrictYaml, CollectsWhatDoesNotStopTheReading) {
                           HasSubstr("4:4: .nan")));
 }
 
-TEST(StrictYaml, RefusesASecondDocument) {
+TEST(StrictYaml, RefusesASecondDocumentAndWhateverElseFollows) {
   EXPECT_THAT(finding_of("a: 1\n---\nb: 2\n"), HasSubstr("2:1: a second document follows; keep one"));
+  EXPECT_THAT(findings_of("[1, 2]\n]\n"), SizeIs(1));
   EXPECT_EQ(value_of("---\na: 1\n...\n"), json({{"a", 1}}));
 }
-
-TEST(StrictYaml, RefusesWhatFollowsTheDocument) { EXPECT_THAT(findings_of("[1, 2]\n]\n"), SizeIs(1)); }
 
 TEST(StrictYaml, RefusesTabsInTheIndentation) {
   EXPECT_EQ(finding_of("a:\n\tb: 1\n"), "2:1: a tab in the indentation; indent with spaces");
@@ -189,12 +185,9 @@ TEST(StrictYaml, RefusesTagsAndMergeKeysAndKeysThatAreNoWords) {
   EXPECT_THAT(finding_of("a: 1\n: 2\n"), HasSubstr("a key must be a word"));
 }
 
-TEST(StrictYaml, RefusesTextsThatSayNothing) {
+TEST(StrictYaml, RefusesTextsThatSayNothingAndBrokenYamlWhereItBreaks) {
   for (const char* text : {"", "\n\n", "# only a comment\n"})
     EXPECT_THAT(finding_of(text), HasSubstr("1:1: the file is empty"));
-}
-
-TEST(StrictYaml, RefusesBrokenYamlWhereItBreaks) {
   EXPECT_THAT(finding_of("a: 1\nb: [1, 2\nc: 3\n"), HasSubstr("not readable as YAML"));
   EXPECT_THAT(finding_of("a: 1\nb: c: d\n"), HasSubstr("2:5: not readable as YAML: illegal map value; check colons"));
   EXPECT_THAT(finding_of("a: *nobody\n"), HasSubstr("1:4: not readable as YAML: the referenced anchor is not defined"));

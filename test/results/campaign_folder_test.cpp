@@ -1,23 +1,28 @@
 #include "results/campaign_folder.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "results/journal.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 #include "test/temporary_folder.hpp"
+#include "test/verb.hpp"
 
-namespace kphi::results {
-namespace campaign_folder_test {
+namespace kphi::results::campaign_folder_test {
 
+using kphi::test::Said;
+using kphi::test::say;
 using kphi::test::TemporaryFolder;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
+using namespace testing;
+
+std::vector<std::string> names_of(const std::vector<std::filesystem::path>& paths) {
+  std::vector<std::string> names;
+  for (const auto& path : paths) names.push_back(path.filename().string());
+  return names;
+}
 
 TEST(CampaignFolder, NamesRunsSoThatTheySort) {
   EXPECT_EQ(run_file_name("5x3", 90, 2), "5x3_phi090_rep2.h5");
@@ -31,12 +36,10 @@ TEST(CampaignFolder, TellsReferenceRunsFromRepetitions) {
   const auto folder = CampaignFolder::create(parent.path(), "u", "c");
   for (const int repetition : {-10, -2, -1, 1}) std::ofstream(folder.run("5x3_rep7_ref1", 0, repetition)) << "x";
   std::ofstream(folder.runs() / "5x3_phi000_ref3.aborted.h5") << "x";
-  std::vector<std::string> names;
-  for (const auto& path : folder.reference_runs()) names.push_back(path.filename().string());
-  EXPECT_THAT(names, ElementsAre("5x3_rep7_ref1_phi000_ref1.h5", "5x3_rep7_ref1_phi000_ref2.h5",
-                                 "5x3_rep7_ref1_phi000_ref10.h5"));
-  ASSERT_EQ(folder.complete_runs().size(), 1u);
-  EXPECT_EQ(folder.complete_runs()[0].filename(), "5x3_rep7_ref1_phi000_rep1.h5");
+  EXPECT_THAT(
+      names_of(folder.reference_runs()),
+      ElementsAre("5x3_rep7_ref1_phi000_ref1.h5", "5x3_rep7_ref1_phi000_ref2.h5", "5x3_rep7_ref1_phi000_ref10.h5"));
+  EXPECT_THAT(names_of(folder.complete_runs()), ElementsAre("5x3_rep7_ref1_phi000_rep1.h5"));
   EXPECT_EQ(folder.other_runs().size(), 1u) << "a reference run is complete, too";
 }
 
@@ -62,11 +65,10 @@ TEST(CampaignFolder, ListsCompleteRunsInCampaignOrder) {
   std::ofstream(folder.runs() / "5x3_phi045_rep1.aborted.h5") << "x";
   std::ofstream(folder.runs() / "5x3_phi045_rep1.h5.part") << "x";
   const std::vector<double> order{270, 0, 90};
-  std::vector<std::string> names;
-  for (const auto& path : folder.complete_runs(order)) names.push_back(path.filename().string());
-  EXPECT_THAT(names, ElementsAre("5x3_phi270_rep1.h5", "5x3_phi270_rep2.h5", "5x3_phi270_rep10.h5",
-                                 "5x3_phi000_rep1.h5", "5x3_phi000_rep2.h5", "5x3_phi000_rep10.h5",
-                                 "5x3_phi090_rep1.h5", "5x3_phi090_rep2.h5", "5x3_phi090_rep10.h5"));
+  EXPECT_THAT(names_of(folder.complete_runs(order)),
+              ElementsAre("5x3_phi270_rep1.h5", "5x3_phi270_rep2.h5", "5x3_phi270_rep10.h5", "5x3_phi000_rep1.h5",
+                          "5x3_phi000_rep2.h5", "5x3_phi000_rep10.h5", "5x3_phi090_rep1.h5", "5x3_phi090_rep2.h5",
+                          "5x3_phi090_rep10.h5"));
   EXPECT_EQ(folder.complete_runs().front().filename(), "5x3_phi000_rep1.h5");
   EXPECT_EQ(folder.other_runs().size(), 2u);
 }
@@ -91,7 +93,7 @@ TEST_F(VerifiedCampaign, IsWholeAsItWasLeft) {
 }
 
 TEST_F(VerifiedCampaign, EveryFlippedByteOfARunShows) {
-  std::filesystem::permissions(run_, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
+  test::make_writable(run_);
   const std::string whole = read_text(run_);
   for (std::size_t at = 5; at < whole.size(); at += whole.size() / 12) {
     std::string bytes = whole;
@@ -113,5 +115,56 @@ TEST_F(VerifiedCampaign, WithoutItsJournalItIsNotWhole) {
   EXPECT_THAT(verify_campaign(folder_).problems, Contains(HasSubstr("journal.jsonl: missing")));
 }
 
-}  // namespace campaign_folder_test
-}  // namespace kphi::results
+TEST_F(VerifiedCampaign, InfoTellsWhatIsInARun) {
+  const Said said = say("info " + run_.string());
+  EXPECT_EQ(said.code, 0);
+  EXPECT_THAT(said.out, HasSubstr("5 inch, 3 blades"));
+  const auto json = nlohmann::json::parse(say("info --json " + run_.string()).out);
+  EXPECT_EQ(json.at("occlusion_deg"), 90);
+  EXPECT_EQ(json.at("steps"), 3);
+}
+
+TEST_F(VerifiedCampaign, InfoTellsWhatHappenedToTheStreamAndHowItDid) {
+  RunRecording run = test::make_run({});
+  run.events.push_back({EventKind::restarted, 3'000'000'000, 12, "3.000 s: the stream began anew"});
+  run.health.skew_ppm = 17.25;
+  run.motor_counts[2] = 4;
+  const auto file = folder_.run("5x3", 180, 1);
+  (void)test::write_run(file, run);
+  const Said said = say("info " + file.string());
+  EXPECT_THAT(said.out, HasSubstr("3.000 s: the stream began anew"));
+  EXPECT_THAT(said.out, HasSubstr("17.25"));
+  const auto json = nlohmann::json::parse(say("info --json " + file.string()).out);
+  EXPECT_EQ(json.at("events").at(0).at("kind"), "restarted");
+  EXPECT_EQ(json.at("health").at("skew_ppm"), 17.25);
+  EXPECT_EQ(json.at("motor_timeouts"), 4);
+  EXPECT_TRUE(json.at("box_bias").is_null()) << "none was taken";
+}
+
+TEST_F(VerifiedCampaign, InfoTellsWhatIsInAFolder) {
+  std::ofstream(folder_.runs() / "5x3_phi180_rep1.h5.part") << "x";
+  EXPECT_THAT(say("info " + folder_.path().string()).out, HasSubstr("1 complete runs"));
+  const auto json = nlohmann::json::parse(say("info --json " + folder_.path().string()).out);
+  EXPECT_EQ(json.at("runs").size(), 1u);
+  EXPECT_EQ(json.at("not_complete").size(), 1u);
+}
+
+TEST_F(VerifiedCampaign, VerifyEndsWith0ForWholeThings) {
+  EXPECT_EQ(say("verify " + run_.string()).code, 0);
+  const Said said = say("verify --json " + folder_.path().string());
+  EXPECT_EQ(said.code, 0);
+  EXPECT_EQ(nlohmann::json::parse(said.out).at("whole"), true);
+}
+
+TEST_F(VerifiedCampaign, VerifyEndsWith5AndOneLinePerProblem) {
+  test::make_writable(run_);
+  std::filesystem::resize_file(run_, 1000);
+  const Said run = say("verify " + run_.string());
+  EXPECT_EQ(run.code, 5);
+  EXPECT_EQ(std::count(run.out.begin(), run.out.end(), '\n'), 1);
+  const Said folder = say("verify " + folder_.path().string());
+  EXPECT_EQ(folder.code, 5);
+  EXPECT_EQ(std::count(folder.out.begin(), folder.out.end(), '\n'), 2);
+}
+
+}  // namespace kphi::results::campaign_folder_test

@@ -2,7 +2,6 @@
 #include "results/file_layer.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
 
@@ -13,12 +12,10 @@
 #include "test/results/synthetic_run.hpp"
 #include "test/temporary_folder.hpp"
 
-namespace kphi::results {
-namespace file_layer_test {
+namespace kphi::results::file_layer_test {
 
 using kphi::test::TemporaryFolder;
-using ::testing::ElementsAre;
-using ::testing::StartsWith;
+using namespace testing;
 
 TEST(Sha256, KnowsTheStandardsExamples) {  // FIPS 180-2, appendix B.1
   EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
@@ -125,5 +122,4 @@ TEST(Lasting, ACampaignFolderAndTheNamesOfItsLeftoversAreSynced) {
   EXPECT_THAT(files.log, ElementsAre(StartsWith("rename "), "folder runs"));
 }
 
-}  // namespace file_layer_test
-}  // namespace kphi::results
+}  // namespace kphi::results::file_layer_test

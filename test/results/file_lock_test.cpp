@@ -7,8 +7,7 @@
 
 #include "test/temporary_folder.hpp"
 
-namespace kphi::results {
-namespace file_lock_test {
+namespace kphi::results::file_lock_test {
 
 using testing::HasSubstr;
 
@@ -65,5 +64,4 @@ TEST_F(Lock, MovesWithItsOwner) {
   EXPECT_FALSE(take()) << "what was moved from gives nothing back";
 }
 
-}  // namespace file_lock_test
-}  // namespace kphi::results
+}  // namespace kphi::results::file_lock_test

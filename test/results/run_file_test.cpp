@@ -1,11 +1,8 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <fstream>
@@ -18,26 +15,24 @@
 #include "test/results/synthetic_run.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::results {
-namespace run_file_test {
+namespace kphi::results::run_file_test {
 
-using test::digest;
-using test::error_of;
-using test::make_run;
-using test::same_rows;
-using test::TemporaryFolder;
-using test::Truth;
-using test::write_pieces;
-using test::write_run;
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
+using namespace test;
+using namespace testing;
 
-TEST(RunFile, ReadsBackAsWritten) {
+class RunFile : public testing::Test {
+ protected:
+  [[nodiscard]] RunRecording written() const {
+    write_run(path, run);
+    return read_run(path);
+  }
   const TemporaryFolder folder;
-  const RunRecording run = make_run({});
-  write_run(folder / "a.h5", run);
-  const RunRecording again = read_run(folder / "a.h5");
+  const std::filesystem::path path = folder / "a.h5";
+  RunRecording run = make_run({});
+};
+
+TEST_F(RunFile, ReadsBackAsWritten) {
+  const RunRecording again = written();
   EXPECT_TRUE(same_rows(run.load_cell, again.load_cell));
   EXPECT_TRUE(same_rows(run.motor, again.motor));
   EXPECT_TRUE(same_rows(run.phases, again.phases));
@@ -47,9 +42,7 @@ TEST(RunFile, ReadsBackAsWritten) {
   EXPECT_EQ(again.header.uuid, run.header.uuid);
 }
 
-TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
-  const TemporaryFolder folder;
-  RunRecording run = make_run({});
+TEST_F(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
   run.header.load_cell.slots_json = "{\"netftapi2.xml?index=0\": \"<netft/>\"}";
   for (std::size_t kind = 0; kind < kEventNames.size(); ++kind) {
     run.events.push_back({static_cast<EventKind>(kind), 1000 + static_cast<Nanoseconds>(kind), kind,
@@ -60,9 +53,8 @@ TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
   run.health.queue_high_water = 412;
   run.motor_counts = {300, 298, 2, 1};
   run.box_bias = {7000, {1, 2, 3, 4, 5, 6}, {}, {}, {0, 0, 0, 0, 0, 0.25}};
-  write_run(folder / "a.h5", run);
-  EXPECT_TRUE(verify_run(folder / "a.h5").whole());
-  const RunRecording again = read_run(folder / "a.h5");
+  const RunRecording again = written();
+  EXPECT_TRUE(verify_run(path).whole());
   EXPECT_EQ(digest(run), digest(again));
   EXPECT_EQ(again.header.load_cell.slots_json, run.header.load_cell.slots_json);
   EXPECT_EQ(again.health.skew_ppm, -31.5);
@@ -77,16 +69,13 @@ TEST(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
   }
 }
 
-TEST(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
-  const TemporaryFolder folder;
-  RunRecording run = make_run({});
+TEST_F(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
   run.header.supply_voltage_v = 16;
   run.header.coil_temperature_max_degc = 110;
   run.header.clock_gain = 1.004;
   run.header.clock_gain_u = 2e-5;
   run.header.load_cell.saturation_bits = 1u << 27 | 1u << 30;
-  write_run(folder / "a.h5", run);
-  const RunHeader again = read_run(folder / "a.h5").header;
+  const RunHeader again = written().header;
   EXPECT_EQ(again.supply_voltage_v, 16);
   EXPECT_EQ(again.coil_temperature_max_degc, 110);
   EXPECT_EQ(again.clock_gain, 1.004);
@@ -94,24 +83,23 @@ TEST(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
   EXPECT_EQ(again.load_cell.saturation_bits, 1u << 27 | 1u << 30);
 }
 
-TEST(RunFile, RefusesAnotherFormat) {
-  const TemporaryFolder folder;
-  write_run(folder / "a.h5", make_run({}));
-  test::make_writable(folder / "a.h5");
-  std::string bytes = read_text(folder / "a.h5");
+TEST_F(RunFile, RefusesAnotherFormat) {
+  write_run(path, run);
+  test::make_writable(path);
+  std::string bytes = read_text(path);
   bytes.replace(bytes.find(kRunFormat), 10, "kphi-run/9");
-  std::ofstream(folder / "a.h5", std::ios::binary) << bytes;
-  EXPECT_THAT(error_of([&] { (void)read_run(folder / "a.h5"); }),
+  std::ofstream(path, std::ios::binary) << bytes;
+  EXPECT_THAT(error_of([&] { (void)read_run(path); }),
               HasSubstr("format \"kphi-run/9\" cannot be read, only \"kphi-run/1\"; use the version of kphi"));
 }
 
 /// Every dataset, unit, code and attribute of the file stands in the specification.
-TEST(RunFile, IsDescribedInTheReadme) {
+TEST_F(RunFile, IsDescribedInTheReadme) {
   const std::string readme = read_text(kphi::test::source_dir() + "/results/README.md");
   const auto told = [&](const std::string& words) { EXPECT_THAT(readme, HasSubstr(words)); };
-  const auto tell_group = [&](const auto& group, const std::string& path) {
+  const auto tell_group = [&](const auto& group, const std::string& place) {
     for (const auto& column : group.columns) {
-      told(path + column.name + "`");
+      told(place + column.name + "`");
       for (std::size_t code = 0; code < column.codes.size(); ++code) {
         const std::string name = column.codes[code];
         const bool is_event = std::string_view(column.name) == "kind";
@@ -132,20 +120,17 @@ TEST(RunFile, IsDescribedInTheReadme) {
   told(std::string("`") + kRunFormat + "`");
 }
 
-TEST(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestThatFinishGave) {
-  const TemporaryFolder folder;
-  const std::string sha = write_run(folder / "a.h5", make_run({}));
+TEST_F(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestThatFinishGave) {
+  const std::string sha = write_run(path, run);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.h5.part"));
-  EXPECT_EQ(sha, sha256_of_file(folder / "a.h5"));
+  EXPECT_EQ(sha, sha256_of_file(path));
   struct stat info {};
-  ASSERT_EQ(stat((folder / "a.h5").c_str(), &info), 0);
+  ASSERT_EQ(stat((path).c_str(), &info), 0);
   EXPECT_EQ(info.st_mode & 0222u, 0u);
 }
 
-TEST(RunFile, SameInputGivesSameBytesInAnotherProcess) {
-  const TemporaryFolder folder;
-  const RunRecording run = make_run({});
-  write_run(folder / "a.h5", run);
+TEST_F(RunFile, SameInputGivesSameBytesInAnotherProcess) {
+  write_run(path, run);
   const std::time_t second = std::time(nullptr);
   const pid_t child = fork();
   if (child == 0) {
@@ -159,49 +144,40 @@ TEST(RunFile, SameInputGivesSameBytesInAnotherProcess) {
   int status = 0;
   waitpid(child, &status, 0);
   ASSERT_EQ(status, 0);
-  EXPECT_EQ(sha256_of_file(folder / "a.h5"), sha256_of_file(folder / "b.h5"));
+  EXPECT_EQ(sha256_of_file(path), sha256_of_file(folder / "b.h5"));
 }
 
-TEST(RunFile, NeverOverwritesAFinalFile) {
-  const TemporaryFolder folder;
-  const RunRecording run = make_run({});
-  const std::string sha = write_run(folder / "a.h5", run);
-  EXPECT_THAT(error_of<RecordError>([&] { RunWriter writer(folder / "a.h5", run.header); }),
-              HasSubstr("exists already"));
-  EXPECT_EQ(sha, sha256_of_file(folder / "a.h5"));
+TEST_F(RunFile, NeverOverwritesAFinalFile) {
+  const std::string sha = write_run(path, run);
+  EXPECT_THAT(error_of<RecordError>([&] { RunWriter writer(path, run.header); }), HasSubstr("exists already"));
+  EXPECT_EQ(sha, sha256_of_file(path));
 }
 
-TEST(RunFile, DoesNotReplaceAFileThatAppearedMeanwhile) {
-  const TemporaryFolder folder;
-  const RunRecording run = make_run({});
-  RunWriter writer(folder / "a.h5", run.header);
+TEST_F(RunFile, DoesNotReplaceAFileThatAppearedMeanwhile) {
+  RunWriter writer(path, run.header);
   write_pieces(writer, run);
-  std::ofstream(folder / "a.h5") << "mine";
+  std::ofstream(path) << "mine";
   EXPECT_THROW((void)writer.finish(run), RecordError);
-  EXPECT_EQ(std::filesystem::file_size(folder / "a.h5"), 4u);
+  EXPECT_EQ(std::filesystem::file_size(path), 4u);
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }
 
-TEST(RunFile, SetsAnInterruptedPartAside) {
-  const TemporaryFolder folder;
-  const RunRecording run = make_run({});
+TEST_F(RunFile, SetsAnInterruptedPartAside) {
   {
-    RunWriter dies(folder / "a.h5", run.header);
+    RunWriter dies(path, run.header);
     dies.append(std::span<const LoadCellRecord>(run.load_cell).first(100));
   }
-  write_run(folder / "a.h5", run);
-  EXPECT_TRUE(verify_run(folder / "a.h5").whole());
+  write_run(path, run);
+  EXPECT_TRUE(verify_run(path).whole());
   EXPECT_TRUE(std::filesystem::exists(folder / "a.interrupted.h5.part"));
 }
 
-TEST(RunFile, AbortedRunsKeepTheirReasonAndNeverReplaceEachOther) {
-  const TemporaryFolder folder;
-  RunRecording run = make_run({});
+TEST_F(RunFile, AbortedRunsKeepTheirReasonAndNeverReplaceEachOther) {
   run.outcome = Outcome::aborted;
   run.outcome_reason = "coil temperature above 80 °C";
-  write_run(folder / "a.h5", run);
-  write_run(folder / "a.h5", run);
-  EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
+  write_run(path, run);
+  write_run(path, run);
+  EXPECT_FALSE(std::filesystem::exists(path));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.aborted-2.h5"));
   const RunRecording again = read_run(folder / "a.aborted.h5");
   EXPECT_EQ(again.outcome, Outcome::aborted);
@@ -209,11 +185,9 @@ TEST(RunFile, AbortedRunsKeepTheirReasonAndNeverReplaceEachOther) {
   EXPECT_TRUE(verify_run(folder / "a.aborted.h5").whole());
 }
 
-TEST(RunFile, DestructorLeavesAReadablePart) {
-  const TemporaryFolder folder;
-  const RunRecording run = make_run({});
+TEST_F(RunFile, DestructorLeavesAReadablePart) {
   {
-    RunWriter writer(folder / "a.h5", run.header);
+    RunWriter writer(path, run.header);
     write_pieces(writer, run);
   }
   const RunRecording again = read_run(folder / "a.h5.part");
@@ -222,27 +196,22 @@ TEST(RunFile, DestructorLeavesAReadablePart) {
   EXPECT_THAT(verify_run(folder / "a.h5.part").problems, Contains(HasSubstr("stopped before the end")));
 }
 
-TEST(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {
-  const TemporaryFolder folder;
-  RunRecording run = make_run({});
+TEST_F(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {
   run.load_cell.erase(run.load_cell.begin() + 1000);
   run.account.received -= 1;
   run.account.expected -= 1;
-  EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run); }),
-              HasSubstr("1 missing samples, 0 were counted"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
+  EXPECT_THAT(error_of<RecordError>([&] { write_run(path, run); }), HasSubstr("1 missing samples, 0 were counted"));
+  EXPECT_FALSE(std::filesystem::exists(path));
   EXPECT_TRUE(std::filesystem::exists(folder / "a.h5.part"));
 }
 
-TEST(RunFile, WithAnUnknownCodeIsRefused) {
-  const TemporaryFolder folder;
-  RunRecording run = make_run({});
+TEST_F(RunFile, WithAnUnknownCodeIsRefused) {
   run.phases[1].phase = static_cast<Phase>(200);
-  EXPECT_THAT(error_of<RecordError>([&] { write_run(folder / "a.h5", run); }),
+  EXPECT_THAT(error_of<RecordError>([&] { write_run(path, run); }),
               HasSubstr("commands row 1 has the unknown phase 200"));
 }
 
-TEST(RunFile, WithoutRoomNothingBegins) {
+TEST_F(RunFile, WithoutRoomNothingBegins) {
   class Tiny : public FileLayer {
     std::uint64_t free_bytes(const std::filesystem::path&) override { return 1000; }
   } tiny;
@@ -251,18 +220,16 @@ TEST(RunFile, WithoutRoomNothingBegins) {
               StartsWith("disk full: /somewhere: "));
 }
 
-TEST(RunFile, BytesNeededAreEnoughButNotFarOff) {
-  const TemporaryFolder folder;
+TEST_F(RunFile, BytesNeededAreEnoughButNotFarOff) {
   Truth truth;
   truth.rate_hz = 7000;
   truth.ft_stride = 1;
-  const RunRecording run = make_run(truth);
-  write_run(folder / "a.h5", run);
+  run = make_run(truth);
+  write_run(path, run);
   const std::uint64_t needed = RunWriter::bytes_needed(run.load_cell.size(), run.motor.size());
-  EXPECT_GE(needed, std::filesystem::file_size(folder / "a.h5"));
-  EXPECT_LE(needed, 4 * std::filesystem::file_size(folder / "a.h5"));
+  EXPECT_GE(needed, std::filesystem::file_size(path));
+  EXPECT_LE(needed, 4 * std::filesystem::file_size(path));
   EXPECT_GT(RunWriter::bytes_needed(0, 1'000'000), 24'000'000u) << "readings";
 }
 
-}  // namespace run_file_test
-}  // namespace kphi::results
+}  // namespace kphi::results::run_file_test

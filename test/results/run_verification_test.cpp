@@ -1,45 +1,43 @@
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <fstream>
-#include <random>
 
 #include "results/run_reader.hpp"
 #include "results/run_writer.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace run_verification_test {
+namespace kphi::results::run_verification_test {
 
-using test::digest;
-using test::make_run;
-using test::make_writable;
-using test::same_rows;
-using test::TemporaryFolder;
-using test::Truth;
-using test::write_run;
-using ::testing::Contains;
-using ::testing::HasSubstr;
+using namespace test;
+using namespace testing;
 
 class VerifiedRun : public ::testing::Test {
  protected:
   /// Problems of the run, written as aborted, so that finish() does not refuse it.
-  std::vector<std::string> problems_of(RunRecording run) {
-    run.outcome = Outcome::aborted;
+  std::vector<std::string> problems_of(RunRecording written) {
+    written.outcome = Outcome::aborted;
     std::filesystem::remove(folder_ / "a.aborted.h5");
-    write_run(path_, run);
+    write_run(path_, written);
     return verify_run(folder_ / "a.aborted.h5").problems;
   }
+  /// Writes the run as finished.
+  [[nodiscard]] std::string bytes_of(const RunRecording& written) const {
+    write_run(path_, written);
+    make_writable(path_);
+    return read_text(path_);
+  }
+  void put(const std::string& bytes) const { std::ofstream(path_, std::ios::binary) << bytes; }
   TemporaryFolder folder_;
   const std::filesystem::path path_ = folder_ / "a.h5";
+  RunRecording run = make_run({});
 };
 
 TEST_F(VerifiedRun, WithCountedLossesIsWhole) {
   Truth truth;
   truth.lose = [](std::uint64_t n) { return n % 1000 == 500 || (n > 3000 && n < 3050); };
-  const RunRecording run = make_run(truth);
+  run = make_run(truth);
   write_run(path_, run);
   const Verification found = verify_run(path_);
   EXPECT_TRUE(found.whole()) << ::testing::PrintToString(found.problems);
@@ -48,24 +46,18 @@ TEST_F(VerifiedRun, WithCountedLossesIsWhole) {
 }
 
 TEST_F(VerifiedRun, FlippedBytesInTheSamplesShow) {
-  const RunRecording run = make_run({});
-  write_run(path_, run);
-  make_writable(path_);
-  std::string bytes = read_text(path_);
+  std::string bytes = bytes_of(run);
   // The bytes of row 4321 of counts, found by their value.
   const std::string row(reinterpret_cast<const char*>(run.load_cell[4321].counts.data()), 24);
   const std::size_t at = bytes.find(row);
   ASSERT_NE(at, std::string::npos);
   bytes[at + 8] = static_cast<char>(bytes[at + 8] ^ 1);
-  std::ofstream(path_, std::ios::binary) << bytes;
+  put(bytes);
   EXPECT_THAT(verify_run(path_).problems, Contains(HasSubstr("load_cell/counts does not match its checksum")));
 }
 
 TEST_F(VerifiedRun, FlippedBytesAnywhereNeitherCrashNorGiveOtherSamples) {
-  const RunRecording run = make_run({});
-  write_run(path_, run);
-  make_writable(path_);
-  const std::string whole = read_text(path_);
+  const std::string whole = bytes_of(run);
   std::mt19937_64 random(11);
   int noticed = 0;
   for (int trial = 0; trial < 60; ++trial) {
@@ -73,7 +65,7 @@ TEST_F(VerifiedRun, FlippedBytesAnywhereNeitherCrashNorGiveOtherSamples) {
     // Half of them in the first 64 KiB, where most of the structure lies.
     const std::size_t at = random() % (trial % 2 == 0 ? 65536 : bytes.size());
     bytes[at] = static_cast<char>(bytes[at] ^ (1 << (random() % 8)));
-    std::ofstream(path_, std::ios::binary) << bytes;
+    put(bytes);
     if (!verify_run(path_).whole()) {
       ++noticed;
       continue;
@@ -87,18 +79,15 @@ TEST_F(VerifiedRun, FlippedBytesAnywhereNeitherCrashNorGiveOtherSamples) {
 }
 
 TEST_F(VerifiedRun, ChangedAttributesShow) {
-  write_run(path_, make_run({}));
-  make_writable(path_);
-  std::string bytes = read_text(path_);
+  std::string bytes = bytes_of(run);
   const std::size_t at = bytes.find("5 inch, 3 blades");
   ASSERT_NE(at, std::string::npos);
   bytes[at] = '6';
-  std::ofstream(path_, std::ios::binary) << bytes;
+  put(bytes);
   EXPECT_FALSE(verify_run(path_).whole());
 }
 
 TEST_F(VerifiedRun, AMissingSampleShows) {
-  RunRecording run = make_run({});
   run.load_cell.erase(run.load_cell.begin() + 777);
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("were received")));
   run.account.received -= 1;
@@ -107,7 +96,6 @@ TEST_F(VerifiedRun, AMissingSampleShows) {
 }
 
 TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
-  RunRecording run = make_run({});
   run.load_cell[100] = run.load_cell[99];
   EXPECT_THAT(problems_of(run), Contains(HasSubstr("occur twice")));
   run = make_run({});
@@ -122,7 +110,6 @@ TEST_F(VerifiedRun, ADoubledSampleARebootAndALeftStrideShow) {
 
 /// The counting stays a whole number of records where the box left out samples between two of them, or began anew.
 TEST_F(VerifiedRun, AGapThatIsNoMultipleOfTheStrideIsWholeWhenItWasCounted) {
-  RunRecording run = make_run({});
   for (std::size_t i = 1000; i < run.load_cell.size(); ++i) run.load_cell[i].ft_sequence += 25;  // 4.6 strides
   run.account.lost_network += 3, run.account.lost_host += 1;
   run.account.expected += 4;
@@ -131,7 +118,6 @@ TEST_F(VerifiedRun, AGapThatIsNoMultipleOfTheStrideIsWholeWhenItWasCounted) {
 }
 
 TEST_F(VerifiedRun, AStreamThatBeginsAnewAtAnySampleOfTheBoxIsWhole) {
-  RunRecording run = make_run({});
   const std::uint32_t first = run.load_cell[2000].rdt_sequence - 1;
   for (std::size_t i = 2000; i < run.load_cell.size(); ++i) {
     run.load_cell[i].ft_sequence += 3;
@@ -146,7 +132,6 @@ TEST_F(VerifiedRun, AStreamThatBeginsAnewAtAnySampleOfTheBoxIsWhole) {
 }
 
 TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
-  RunRecording run = make_run({});
   for (std::size_t i = 0; i < run.load_cell.size(); ++i)
     run.load_cell[i].ft_sequence = static_cast<std::uint32_t>(7 * (i < 5000 ? i : i - 5000));
   run.account.reboots = 1;
@@ -156,9 +141,7 @@ TEST_F(VerifiedRun, WithARestartOfTheBoxThatWasCountedIsWhole) {
 }
 
 TEST_F(VerifiedRun, ATruncatedFileShows) {
-  write_run(path_, make_run({}));
-  make_writable(path_);
-  const auto size = std::filesystem::file_size(path_);
+  const std::uintmax_t size = bytes_of(run).size();
   for (const std::uintmax_t left : {size - 1, size / 2, std::uintmax_t{1000}, std::uintmax_t{0}}) {
     std::filesystem::resize_file(path_, left);
     EXPECT_FALSE(verify_run(path_).whole()) << left;
@@ -167,7 +150,6 @@ TEST_F(VerifiedRun, ATruncatedFileShows) {
 }
 
 TEST_F(VerifiedRun, AStrangeScaleShows) {
-  RunRecording run = make_run({});
   run.header.load_cell.counts_per_newton = 0;
   EXPECT_THAT(problems_of(run), Contains("counts_per_newton is 0"));
   run = make_run({});
@@ -185,5 +167,4 @@ TEST_F(VerifiedRun, WhatIsNoRunFileIsSaidToBeNone) {
   EXPECT_THAT(verify_run(folder_ / "pipe.h5").problems, Contains(HasSubstr("a pipe"))) << "and nobody waits for it";
 }
 
-}  // namespace run_verification_test
-}  // namespace kphi::results
+}  // namespace kphi::results::run_verification_test

@@ -1,7 +1,6 @@
 #include "results/steps_csv.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <rapidcheck.h>
 
 #include <bit>
@@ -12,14 +11,11 @@
 #include "test/results/recordings.hpp"
 #include "test/temporary_folder.hpp"
 
-namespace kphi::results {
-namespace steps_csv_test {
+namespace kphi::results::steps_csv_test {
 
 using kphi::test::TemporaryFolder;
 using test::error_of;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::StartsWith;
+using namespace testing;
 
 std::vector<StepMean> arbitrary_steps() {
   return *rc::gen::container<std::vector<StepMean>>(rc::gen::exec([] {
@@ -138,5 +134,4 @@ TEST(QualityFlags, HaveNamesBothWays) {
     EXPECT_EQ(quality_flags_from_names(quality_flag_names(flags)), flags);
 }
 
-}  // namespace steps_csv_test
-}  // namespace kphi::results
+}  // namespace kphi::results::steps_csv_test

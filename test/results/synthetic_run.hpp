@@ -1,8 +1,6 @@
 // A run with known truth: a propeller of constant k, a load cell with drift and lag, a motor that takes its time.
 #pragma once
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -14,11 +12,26 @@
 
 #include "results/records.hpp"
 #include "results/run_writer.hpp"
+#include "results/step_mean.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::results::test {
 
 using kphi::test::TemporaryFolder;
+
+inline double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+
+inline bool has(const StepMean& step, QualityFlag flag) {
+  return (step.quality_flags & static_cast<std::uint32_t>(flag)) != 0;
+}
+
+/// Their places.
+inline std::vector<int> steps_flagged(const std::vector<StepMean>& steps, QualityFlag flag) {
+  std::vector<int> places;
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (has(steps[i], flag)) places.push_back(static_cast<int>(i));
+  return places;
+}
 
 struct Truth {
   double k = 1.2e-6;           ///< N/(rad/s)²

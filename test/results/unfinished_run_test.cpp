@@ -1,6 +1,5 @@
 // Writers that are killed, and disks that say no: what was synced stays.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -8,7 +7,6 @@
 
 #include <csignal>
 #include <cstring>
-#include <random>
 #include <system_error>
 
 #include "results/run_reader.hpp"
@@ -16,17 +14,10 @@
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace unfinished_run_test {
+namespace kphi::results::unfinished_run_test {
 
-using test::error_of;
-using test::make_run;
-using test::same;
-using test::TemporaryFolder;
-using test::Truth;
-using test::write_run;
-using ::testing::HasSubstr;
-using ::testing::StartsWith;
+using namespace test;
+using namespace testing;
 
 /// The child appends and syncs for ever, telling each sync's sample count through the pipe; the parent kills it.
 TEST(KilledWriter, LeavesEverythingUpToItsLastSync) {
@@ -106,28 +97,33 @@ std::string error_in_child(Action&& action) {
   return text;
 }
 
-TEST(DiskFull, ShowsAtTheVeryChunkAndSparesWhatWasSynced) {
-  const TemporaryFolder folder;
+/// What was synced before the disk was full is there, and nothing else.
+void expect_beginning_of(const RunRecording& run, const RunRecording& rescued) {
+  EXPECT_GE(rescued.load_cell.size(), 8192u);
+  EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
+  for (std::size_t i = 0; i < rescued.load_cell.size(); ++i)
+    ASSERT_TRUE(same(rescued.load_cell[i], run.load_cell[i])) << i;
+}
+
+RunRecording fast_run() {
   Truth truth;
   truth.rate_hz = 7000;
   truth.ft_stride = 1;
-  const RunRecording run = make_run(truth);
+  return make_run(truth);
+}
+
+TEST(DiskFull, ShowsAtTheVeryChunkAndSparesWhatWasSynced) {
+  const TemporaryFolder folder;
+  const RunRecording run = fast_run();
   const std::string text = error_in_child([&] {
     signal(SIGXFSZ, SIG_IGN);
     const rlimit limit{1500000, 1500000};
     setrlimit(RLIMIT_FSIZE, &limit);
     write_run(folder / "a.h5", run);
   });
-  EXPECT_THAT(text, StartsWith("disk full: "));
-  EXPECT_THAT(text, HasSubstr("a.h5.part"));
-  EXPECT_THAT(text, ::testing::Not(HasSubstr("ended with status")));
+  EXPECT_THAT(text, AllOf(StartsWith("disk full: "), HasSubstr("a.h5.part"), Not(HasSubstr("ended with status"))));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.h5"));
-
-  const RunRecording rescued = read_run(folder / "a.h5.part");
-  EXPECT_GE(rescued.load_cell.size(), 8192u);
-  EXPECT_LT(rescued.load_cell.size(), run.load_cell.size());
-  for (std::size_t i = 0; i < rescued.load_cell.size(); ++i)
-    ASSERT_TRUE(same(rescued.load_cell[i], run.load_cell[i])) << i;
+  expect_beginning_of(run, read_run(folder / "a.h5.part"));
 }
 
 TEST(DiskFull, OnARealFullFileSystemSaysNoSpaceLeft) {
@@ -135,18 +131,12 @@ TEST(DiskFull, OnARealFullFileSystemSaysNoSpaceLeft) {
   if (mount("none", folder.path().c_str(), "tmpfs", 0, "size=2m") != 0) {
     GTEST_SKIP() << "cannot mount a small tmpfs: " << std::strerror(errno);
   }
-  Truth truth;
-  truth.rate_hz = 7000;
-  truth.ft_stride = 1;
-  const RunRecording run = make_run(truth);
+  const RunRecording run = fast_run();
   const std::string text = error_in_child([&] { write_run(folder / "a.h5", run); });
   const RunRecording rescued = read_run(folder / "a.h5.part");
   umount2(folder.path().c_str(), MNT_DETACH);
-  EXPECT_THAT(text, StartsWith("disk full: "));
-  EXPECT_THAT(text, HasSubstr("No space left on device"));
-  EXPECT_GE(rescued.load_cell.size(), 8192u);
-  for (std::size_t i = 0; i < rescued.load_cell.size(); ++i)
-    ASSERT_TRUE(same(rescued.load_cell[i], run.load_cell[i])) << i;
+  EXPECT_THAT(text, AllOf(StartsWith("disk full: "), HasSubstr("No space left on device")));
+  expect_beginning_of(run, rescued);
 }
 
 /// Refuses once so many bytes have gone to files.
@@ -203,5 +193,4 @@ TEST(DiskFull, ARunIsNotCalledCompleteBeforeItsDataAreOnDisk) {
   }
 }
 
-}  // namespace unfinished_run_test
-}  // namespace kphi::results
+}  // namespace kphi::results::unfinished_run_test

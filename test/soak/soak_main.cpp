@@ -7,10 +7,9 @@
 #include <CLI/CLI.hpp>
 #include <array>
 #include <csignal>
-#include <optional>
 #include <thread>
 
-#include "test/soak/soak_lives.hpp"
+#include "test/soak/soak_verdict.hpp"
 
 namespace {
 

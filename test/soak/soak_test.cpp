@@ -1,15 +1,11 @@
 // Short campaigns with random faults of every device, mistakes of the operator, a refusing disk and kills: each from
 // its seed. What is held of each stands in soak_verdict.hpp; ./run soak lives through ten thousand of them.
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <set>
-
 #include "drivers/sim/script/faults.hpp"
-#include "test/soak/soak_lives.hpp"
+#include "test/soak/soak_verdict.hpp"
 
-namespace kphi::soak {
-namespace soak_test {
+namespace kphi::soak::soak_test {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr int kSeedsInOne = 5;
@@ -79,5 +75,4 @@ TEST_P(OnceWrong, IsRight) { expect_nothing_wrong(GetParam()); }
 INSTANTIATE_TEST_SUITE_P(Seeds, OnceWrong, testing::Values(421, 1619, 2420, 4123, 6724, 6807, 8001));
 #endif
 
-}  // namespace soak_test
-}  // namespace kphi::soak
+}  // namespace kphi::soak::soak_test

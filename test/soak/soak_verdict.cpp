@@ -2,9 +2,20 @@
 
 #include <boost/math/distributions/binomial.hpp>
 
+#include "test/dice.hpp"
 #include "test/soak/verdict_checks.hpp"
 
 namespace kphi::soak {
+namespace {
+
+constexpr int kMostLives = 4;
+
+bool goes_on(const Evidence& evidence, test::Dice& dice) {
+  if (!evidence.left || evidence.story.end == End::finished || evidence.mixture.life == kMostLives) return false;
+  return evidence.cut_short() || dice.once_in(3);
+}
+
+}  // namespace
 
 bool is_chance(std::uint64_t flagged, std::uint64_t clean) {
   if (clean == 0) return flagged == 0;
@@ -24,6 +35,21 @@ Verdict judge(const Evidence& evidence) {
   check_end(evidence, reaches, verdict.wrong);
   check_steps_of_runs(evidence, reaches, verdict);
   return verdict;
+}
+
+void live_through(std::uint64_t seed, const std::function<void(const Evidence&, const Verdict&)>& judged) {
+  test::Dice dice(~seed);
+  Mixture mixture = draw(seed);
+  auto world = std::make_unique<World>(mixture, quick_folder());
+  for (;;) {
+    world->live();
+    const Evidence evidence = evidence_of(*world);
+    const Verdict verdict = judge(evidence);
+    judged(evidence, verdict);
+    if (!verdict.wrong.empty() || !goes_on(evidence, dice)) return;
+    mixture = draw_resumed(mixture);
+    world = std::make_unique<World>(mixture, quick_folder(), *evidence.left);
+  }
 }
 
 }  // namespace kphi::soak

@@ -25,6 +25,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -45,5 +46,11 @@ struct Verdict {
 inline constexpr double kFlaggedByChance = 0.003;
 /// So many of them, or more, would be flagged at least once in a million times.
 [[nodiscard]] bool is_chance(std::uint64_t flagged, std::uint64_t clean);
+
+/// A campaign through all its lives: whatever ended one of them, somebody may go on with what it left.
+/// Lives the campaign of `seed` and judges it; then, as long as nothing is wrong, resumes it: always when it was killed
+/// or its disk had refused, now and then after another end, until it is finished or four times in all. `judged` is
+/// called for each life. Deterministic.
+void live_through(std::uint64_t seed, const std::function<void(const Evidence&, const Verdict&)>& judged);
 
 }  // namespace kphi::soak

@@ -3,16 +3,12 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fstream>
-#include <map>
-#include <set>
 
 #include "results/file_layer.hpp"
 
-namespace kphi::soak {
-namespace soak_verdict_test {
+namespace kphi::soak::soak_verdict_test {
 
 using namespace std::chrono_literals;
 using results::QualityFlag;
@@ -431,5 +427,4 @@ TEST(SoakVerdict, BearsOnlyAsManyCleanStepsFlaggedAsChanceExplains) {
   EXPECT_FALSE(of(0.05, 200)) << "and a larger one in fifty";
 }
 
-}  // namespace soak_verdict_test
-}  // namespace kphi::soak
+}  // namespace kphi::soak::soak_verdict_test

@@ -1,7 +1,6 @@
 // One mixture lived through on the deterministic bench, watched from outside.
 #pragma once
 
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>

@@ -8,8 +8,7 @@
 #include "results/file_layer.hpp"
 #include "test/temporary_folder.hpp"
 
-namespace kphi::soak {
-namespace torn_write_test {
+namespace kphi::soak::torn_write_test {
 
 namespace fs = std::filesystem;
 
@@ -73,5 +72,4 @@ TEST_F(Torn, OfTwoWrittenFilesNobodyKnowsWhichCameFirst) {
             "x");
 }
 
-}  // namespace torn_write_test
-}  // namespace kphi::soak
+}  // namespace kphi::soak::torn_write_test

@@ -46,6 +46,79 @@ void check_reason(const Evidence& evidence, const Reaches& reaches, Lines& wrong
   if (!right) wrong.push_back(told + ", where no fault of that device was");
 }
 
+constexpr Duration kOldest = 250ms;
+constexpr double kSafeToTouch = 5.0;  // rad/s
+
+/// When the power stage was open for good.
+Instant coasting_since(const Story& story) {
+  if (story.stages.empty()) return Instant{0};
+  if (story.stages.back().mode != sim::PowerStage::Mode::coast) return kNever;
+  return story.stages.size() == 1 ? Instant{0} : story.stages.back().at;
+}
+
+void check_end_of_motion(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
+  const Story& story = evidence.story;
+  const Instant since = coasting_since(story);
+  if (since == kNever) return wrong.push_back("motion: the motor never coasts");
+  if (story.end == End::finished) {
+    if (since > story.ended) wrong.push_back("motion: the campaign has ended and the motor does not coast");
+    return;
+  }
+  const Instant decided = evidence.killed() ? story.ended : story.last_good_tick + 10ms;
+  const bool slept = story.woke && *story.woke - evidence.mixture.sleep->lasts <= decided + kHeard;
+  const bool alone = evidence.killed() || slept || reaches.line_silenced(decided - kOwnTimeout, decided + kOwnTimeout);
+  const Duration limit = alone ? kOwnTimeout : kHeard;
+  if (since > decided + limit)
+    wrong.push_back(
+        fmt::format("motion: coasts {:.0f} ms after {}, {:.0f} ms are allowed", 1e3 * to_seconds(since - decided),
+                    evidence.killed() ? "the kill" : "the last look that found all well", 1e3 * to_seconds(limit)));
+}
+
+/// The module let the motor go while the computer slept, or coasts since: whatever was ordered before is void.
+void check_waking(const Story& story, Lines& wrong) {
+  if (!story.woke) return;
+  for (const Story::StageChange& change : story.stages) {
+    if (change.at > *story.woke && change.mode == sim::PowerStage::Mode::drive)
+      wrong.push_back(fmt::format("motion: driven at {:.3f} s, though the computer slept until {:.3f} s",
+                                  to_seconds(change.at), to_seconds(*story.woke)));
+  }
+}
+
+/// Somebody is about to reach into the propeller.
+void check_prompts(const Story& story, Lines& wrong) {
+  for (const Story::Prompt& prompt : story.prompts) {
+    if (prompt.mode != sim::PowerStage::Mode::coast) wrong.push_back("motion: at a prompt the motor does not coast");
+    if (prompt.speed_rad_s > kSafeToTouch) wrong.push_back("motion: at a prompt the propeller turns");
+  }
+}
+
+/// A module that no order reaches drives until its own timeout.
+void check_freshness(const Story& story, const Reaches& reaches, Lines& wrong) {
+  std::vector<Instant> arrivals;
+  for (const auto& stream : story.streams)
+    for (const auto& arrival : stream.arrivals) arrivals.push_back(arrival.at);
+  std::sort(arrivals.begin(), arrivals.end());
+  const auto& stages = story.stages;
+  const Instant end = story.ended;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    if (stages[i].mode != sim::PowerStage::Mode::drive || stages[i].at > end) continue;
+    const Instant until = std::min(end, i + 1 < stages.size() ? stages[i + 1].at : end);
+    Instant last = stages[i].at;
+    const auto note = [&](Instant at) {
+      const Instant told = last + kOldest;
+      const bool alone = reaches.line_silenced(told - kOwnTimeout, at);
+      if (at > told + (alone ? kOwnTimeout : Duration(0)))
+        wrong.push_back(fmt::format("motion: driven at {:.3f} s though no record came for {:.3f} s", to_seconds(at),
+                                    to_seconds(at - last)));
+      last = at;
+    };
+    for (auto at = std::lower_bound(arrivals.begin(), arrivals.end(), stages[i].at);
+         at != arrivals.end() && *at < until; ++at)
+      note(*at);
+    note(until);
+  }
+}
+
 }  // namespace
 
 void check_end(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
@@ -78,6 +151,13 @@ void check_end(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
     case End::unknown:
       return unless(false);
   }
+}
+
+void check_motion(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
+  check_prompts(evidence.story, wrong);
+  check_waking(evidence.story, wrong);
+  check_end_of_motion(evidence, reaches, wrong);
+  if (!evidence.killed()) check_freshness(evidence.story, reaches, wrong);
 }
 
 }  // namespace kphi::soak

@@ -13,13 +13,30 @@ const double kMorphSeconds = example_build().morph_s;
 
 constexpr double kWidth = 0.002;
 
-struct World {
-  Vehicle vehicle = example_vehicle();
-  Truth truth = clean_scene().truth;
+const double kThrustCoefficient = bench_line().thrust_coefficient().value();
 
-  [[nodiscard]] Aircraft plant() const {
-    return Aircraft(vehicle, truth, bench_line().thrust_coefficient(), example_shadow());
+struct World {
+  explicit World(const Truth& with) : truth(with) {}
+
+  /// A drone that begins level and carries itself, `steps` later.
+  [[nodiscard]] AircraftState hovered(const Eigen::Vector3d& from, int steps) const {
+    const double hover = std::sqrt(kGravity * x.mass.mass_kg / 4 / kThrustCoefficient);
+    AircraftState state = level_state({from, {0, 0, 0}}, x.mass, hover);
+    for (int i = 0; i < steps; ++i) {
+      state = plant.step(state, kWidth, {&x, &x, &x}, Eigen::Vector4d::Constant(hover));
+    }
+    return state;
   }
+
+  const Vehicle vehicle = example_vehicle();
+  const Truth truth;
+  const Aircraft plant{vehicle, truth, bench_line().thrust_coefficient(), example_shadow()};
+  const Configuration x = plant.configuration(vehicle.x, {});
+};
+
+class InCleanAir : public testing::Test, public World {
+ protected:
+  InCleanAir() : World(clean_scene().truth) {}
 };
 
 Eigen::Vector3d momentum_in_world(const AircraftState& state) { return state.attitude() * state.momentum(); }
@@ -34,11 +51,9 @@ AircraftState tumbling(const Configuration& configuration, Random& random) {
   return state;
 }
 
-TEST(Aircraft, KeepsMomentumAndEnergyOfABodyThatNothingTouches) {
-  const World world;
-  const Aircraft plant = world.plant();
+TEST_F(InCleanAir, KeepsMomentumAndEnergyOfABodyThatNothingTouches) {
   Random random(4);
-  for (const Angles& shape : {world.vehicle.x, world.vehicle.o, compensation::shape_t()}) {
+  for (const Angles& shape : {vehicle.x, vehicle.o, compensation::shape_t()}) {
     const Configuration still = plant.configuration(shape, {});
     AircraftState state = tumbling(still, random);
     const Eigen::Vector3d momentum = momentum_in_world(state);
@@ -56,11 +71,9 @@ TEST(Aircraft, KeepsMomentumAndEnergyOfABodyThatNothingTouches) {
   }
 }
 
-TEST(Aircraft, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
-  const World world;
-  const Aircraft plant = world.plant();
-  ArmMotion motion(world.vehicle.x, kMorphSeconds);
-  motion.begin(world.vehicle.o, 0);
+TEST_F(InCleanAir, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
+  ArmMotion motion(vehicle.x, kMorphSeconds);
+  motion.begin(vehicle.o, 0);
   const auto at = [&](double t) { return plant.configuration(motion.angles(t), motion.rates(t)); };
   Configuration now = at(0);
   AircraftState state = level_state({{0, 0, 0}, {0, 0, 0}}, now.mass, 0);
@@ -82,11 +95,9 @@ TEST(Aircraft, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
   EXPECT_LT(body().position.z(), height);
 }
 
-TEST(Aircraft, BodyMotionIsTheDerivativeOfTheBodysPosition) {
-  const World world;
-  const Aircraft plant = world.plant();
+TEST_F(InCleanAir, BodyMotionIsTheDerivativeOfTheBodysPosition) {
   ArmMotion motion(compensation::shape_t(), kMorphSeconds);
-  motion.begin(world.vehicle.o, 0);
+  motion.begin(vehicle.o, 0);
   const double t = 0.6, width = 1e-4;
   const auto at = [&](double time) { return plant.configuration(motion.angles(time), motion.rates(time)); };
   const Configuration now = at(t), middle = at(t + width / 2), end = at(t + width);
@@ -98,23 +109,19 @@ TEST(Aircraft, BodyMotionIsTheDerivativeOfTheBodysPosition) {
   EXPECT_LT((slope - mean).norm(), 1e-6);
 }
 
-TEST(Aircraft, HoversWhenTheRotorsCarryItsWeight) {
-  World world;
-  world.truth.drag = 0.3;
-  const Aircraft plant = world.plant();
-  const Configuration x = plant.configuration(world.vehicle.x, {});
-  const double hover = std::sqrt(kGravity * x.mass.mass_kg / 4 / bench_line().thrust_coefficient().value());
-  AircraftState state = level_state({{0, 0, 1}, {0, 0, 0}}, x.mass, hover);
-  for (int i = 0; i < 1000; ++i) {
-    state = plant.step(state, kWidth, {&x, &x, &x}, Eigen::Vector4d::Constant(hover));
-  }
-  EXPECT_LT((state.position() - Eigen::Vector3d(0, 0, 1)).norm(), 1e-9);
+Truth with_drag(double drag, const Eigen::Vector3d& wind) {
+  Truth truth = clean_scene().truth;
+  truth.drag = drag;
+  truth.wind = wind;
+  return truth;
 }
 
-TEST(Aircraft, RotorsFollowTheirCommandWithTheirTimeConstant) {
-  const World world;
-  const Aircraft plant = world.plant();
-  const Configuration x = plant.configuration(world.vehicle.x, {});
+TEST(Aircraft, HoversWhenTheRotorsCarryItsWeight) {
+  const Eigen::Vector3d start(0, 0, 1);
+  EXPECT_LT((World(with_drag(0.3, {0, 0, 0})).hovered(start, 1000).position() - start).norm(), 1e-9);
+}
+
+TEST_F(InCleanAir, RotorsFollowTheirCommandWithTheirTimeConstant) {
   AircraftState state = level_state({{0, 0, 0}, {0, 0, 0}}, x.mass, 100);
   const int steps = 33;  // 66 ms, two time constants
   for (int i = 0; i < steps; ++i) {
@@ -123,49 +130,32 @@ TEST(Aircraft, RotorsFollowTheirCommandWithTheirTimeConstant) {
   EXPECT_NEAR(state.rotors()[2], 1100 - 1000 * std::exp(-2.0), 1e-3);
 }
 
-TEST(Aircraft, TorquesPointTheWayTheRotorsPush) {
-  const World world;
-  const Aircraft plant = world.plant();
-  const Configuration x = plant.configuration(world.vehicle.x, {});
+TEST_F(InCleanAir, TorquesPointTheWayTheRotorsPush) {
   AircraftState state = level_state({{0, 0, 0}, {0, 0, 0}}, x.mass, 0);
   state.rotors()[0] = 1000;  // front left: lifts the nose (pitch down is positive y) and the left side
   const AircraftState::Vector slope = plant.slope(state.y, x, state.rotors());
-  const double thrust = bench_line().thrust_coefficient().value() * 1e6;
+  const double thrust = kThrustCoefficient * 1e6;
   EXPECT_NEAR(slope[10], x.mass.hubs[0].y() * thrust, 1e-12);
   EXPECT_NEAR(slope[11], -x.mass.hubs[0].x() * thrust, 1e-12);
   EXPECT_NEAR(slope[12], 0.0133 * thrust, 1e-12);
   EXPECT_NEAR(slope[5], thrust / x.mass.mass_kg - kGravity, 1e-12);
 }
 
-TEST(Aircraft, LosesThrustButNoTorqueOverTheBody) {
-  const World world;
-  const Aircraft plant = world.plant();
-  const Configuration x = plant.configuration(world.vehicle.x, {}), o = plant.configuration(world.vehicle.o, {});
-  const double k_t = bench_line().thrust_coefficient().value();
+TEST_F(InCleanAir, LosesThrustButNoTorqueOverTheBody) {
+  const Configuration o = plant.configuration(vehicle.o, {});
   for (std::size_t i = 0; i < 4; ++i) {
-    EXPECT_EQ(x.thrust_per_square[i], k_t);
-    const double share =
-        thrust_share_in_flight(world.truth.law, world.truth.gamma, example_shadow(), i, world.vehicle.o[i]);
-    EXPECT_EQ(o.thrust_per_square[i], k_t * share);
+    EXPECT_EQ(x.thrust_per_square[i], kThrustCoefficient);
+    const double share = thrust_share_in_flight(truth.law, truth.gamma, example_shadow(), i, vehicle.o[i]);
+    EXPECT_EQ(o.thrust_per_square[i], kThrustCoefficient * share);
     EXPECT_EQ(o.torque_per_square[i], x.torque_per_square[i]);
   }
   EXPECT_GT(o.thrust_per_square[2], 1.02 * o.thrust_per_square[1]) << "arm 3 stops short";
 }
 
 TEST(Aircraft, DriftsWithTheWind) {
-  World world;
-  world.truth.drag = 0.5;
-  world.truth.wind = {1, -2, 0};
-  const Aircraft plant = world.plant();
-  const Configuration x = plant.configuration(world.vehicle.x, {});
-  const double hover = std::sqrt(kGravity * x.mass.mass_kg / 4 / bench_line().thrust_coefficient().value());
-  AircraftState state = level_state({{0, 0, 0}, {0, 0, 0}}, x.mass, hover);
-  const int steps = 1000;
-  for (int i = 0; i < steps; ++i) {
-    state = plant.step(state, kWidth, {&x, &x, &x}, Eigen::Vector4d::Constant(hover));
-  }
-  const double reached = 1 - std::exp(-0.5 * steps * kWidth);
-  EXPECT_LT((state.velocity() - reached * world.truth.wind).norm(), 1e-9);
+  const Eigen::Vector3d wind(1, -2, 0);
+  const double reached = 1 - std::exp(-0.5 * 1000 * kWidth);
+  EXPECT_LT((World(with_drag(0.5, wind)).hovered({0, 0, 0}, 1000).velocity() - reached * wind).norm(), 1e-9);
 }
 
 /// 1.2 s of tumbling with rotors running up and arms folding, in `steps` steps.

@@ -87,11 +87,6 @@ TEST(Control, OfArmsTakenForOneAnotherIsWorseSideways) {
   }
 }
 
-TEST(Flight, IsTheSameFromOneSeedAndAnotherFromAnother) {
-  EXPECT_EQ(hover_error(kHoverPlain, example_scene(3)), hover_error(kHoverPlain, example_scene(3)));
-  EXPECT_NE(hover_error(kHoverPlain, example_scene(3)), hover_error(kHoverPlain, example_scene(4)));
-}
-
 TEST(Flight, LeavesATraceOfEveryTickOfEveryLeg) {
   std::vector<TraceRow> trace;
   (void)flown(kLevelSwitched, example_scene(), &trace);

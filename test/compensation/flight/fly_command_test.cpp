@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <utility>
 
 #include "test/compensation/flight/bench_coefficients.hpp"
@@ -41,13 +40,26 @@ class Fly : public testing::Test {
     int code;
     std::string out, err;
   };
-  static Outcome fly(std::vector<std::string> more, const std::string& coefficients = coefficients_,
+  static Outcome fly(const std::vector<std::string>& more, const std::string& coefficients = coefficients_,
                      const std::string& vehicle = kVehicle) {
     std::vector<std::string> arguments{KPHI_PROGRAM, "fly", "--coefficients", coefficients, "--vehicle", vehicle};
     arguments.insert(arguments.end(), more.begin(), more.end());
     Process process(arguments);
     const int code = process.wait();
     return {code, process.out(), process.err()};
+  }
+
+  using Changes = std::vector<std::pair<std::string, std::string>>;
+  /// With the foldable drone's file after these changes.
+  static Outcome fly_changed(const Changes& changes, const std::vector<std::string>& more = {}) {
+    std::string text = bytes_of(kVehicle);
+    for (const auto& [from, to] : changes) {
+      EXPECT_NE(text.find(from), std::string::npos) << from;
+      text.replace(std::min(text.find(from), text.size()), from.size(), to);
+    }
+    const std::string path = *folder_ / "vehicle.yaml";
+    std::ofstream(path) << text;
+    return fly(more, coefficients_, path);
   }
 
   static TemporaryFolder* folder_;
@@ -91,10 +103,9 @@ TEST_F(Fly, LeavesTracesDrawsAndFigures) {
   }
   if (!gnuplot_is_installed()) GTEST_SKIP() << "apt install gnuplot-nox";
   for (const char* file : {"hover_xo_nc.svg", "rising_o_switched.svg", "draws.svg"}) {
-    std::ostringstream svg;
-    svg << std::ifstream(fs::path(out) / file).rdbuf();
-    EXPECT_THAT(svg.str(), HasSubstr("</svg>")) << file;
-    EXPECT_THAT(svg.str(), HasSubstr("<path")) << file << " draws something";
+    const std::string svg = bytes_of(fs::path(out) / file);
+    EXPECT_THAT(svg, HasSubstr("</svg>")) << file;
+    EXPECT_THAT(svg, HasSubstr("<path")) << file << " draws something";
   }
 }
 
@@ -106,42 +117,22 @@ TEST_F(Fly, FliesOneExperimentAlone) {
   EXPECT_EQ(fly({"--experiment", "loop"}).code, 2);
 }
 
-/// The foldable drone's file with some things changed, in a file of its own.
-std::string changed_vehicle(const TemporaryFolder& folder, const std::string& name,
-                            const std::vector<std::pair<std::string, std::string>>& changes) {
-  std::ostringstream read;
-  read << std::ifstream(kVehicle).rdbuf();
-  std::string text = read.str();
-  for (const auto& [from, to] : changes) {
-    const auto at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    if (at != std::string::npos) text.replace(at, from.size(), to);
-  }
-  const std::string path = folder / (name + ".yaml");
-  std::ofstream(path) << text;
-  return path;
-}
-
-const std::string kSquare = "half_side_m: 0.045 ", kTurns = "hinge_turn_deg: [0, 90, 180, 270]";
-
 /// With this arm at each corner of a body of these half sides.
-std::string outline(double x, double y) {
-  std::ostringstream text;
-  text << "body: {corners_m: [[" << x << "," << y << "],[" << -x << "," << y << "],[" << -x << "," << -y << "],[" << x
-       << "," << -y << "]], hinges: [{x_m: " << x << ", y_m: " << y << ", turn_deg: 0}, {x_m: " << -x << ", y_m: " << y
-       << ", turn_deg: 90}, {x_m: " << -x << ", y_m: " << -y << ", turn_deg: 180}, {x_m: " << x << ", y_m: " << -y
-       << ", turn_deg: 270}]}";
-  return text.str();
+std::vector<std::pair<std::string, std::string>> outline(double x, double y) {
+  return {{"half_side_m: 0.045 ",
+           fmt::format("body: {{corners_m: [[{0},{1}],[-{0},{1}],[-{0},-{1}],[{0},-{1}]], hinges: ["
+                       "{{x_m: {0}, y_m: {1}, turn_deg: 0}}, {{x_m: -{0}, y_m: {1}, turn_deg: 90}}, "
+                       "{{x_m: -{0}, y_m: -{1}, turn_deg: 180}}, {{x_m: {0}, y_m: -{1}, turn_deg: 270}}]}}",
+                       x, y)},
+          {"hinge_turn_deg: [0, 90, 180, 270]", ""}};
 }
 
 TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare) {
-  const std::string square = changed_vehicle(*folder_, "outline", {{kSquare, outline(0.045, 0.045)}, {kTurns, ""}});
-  const Outcome flown = fly({}, coefficients_, square);
+  const Outcome flown = fly_changed(outline(0.045, 0.045));
   ASSERT_EQ(flown.code, 0) << flown.err;
   EXPECT_EQ(flown.out, fly({}).out);
 
-  const std::string oblong = changed_vehicle(*folder_, "oblong", {{kSquare, outline(0.05, 0.04)}, {kTurns, ""}});
-  const Outcome other = fly({"--json"}, coefficients_, oblong);
+  const Outcome other = fly_changed(outline(0.05, 0.04), {"--json"});
   ASSERT_EQ(other.code, 0) << other.err;
   const auto flights = nlohmann::json::parse(other.out)["flights"];
   for (const auto& flight : flights) EXPECT_FALSE(flight["lost"]) << flight["name"];
@@ -151,8 +142,7 @@ TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare)
 }
 
 TEST_F(Fly, SaysNothingInsteadOfZeroWhereEveryDrawLostAFlight) {
-  const std::string limp = changed_vehicle(*folder_, "limp", {{"[12.7, 12.7, 5]", "[1.0, 1.0, 5]"}});
-  const Outcome flown = fly({"--draws", "1", "--json"}, coefficients_, limp);
+  const Outcome flown = fly_changed({{"[12.7, 12.7, 5]", "[1.0, 1.0, 5]"}}, {"--draws", "1", "--json"});
   ASSERT_EQ(flown.code, 0) << flown.err;
   const auto study = nlohmann::json::parse(flown.out)["study"];
   EXPECT_EQ(study["kept"], 0);
@@ -161,32 +151,29 @@ TEST_F(Fly, SaysNothingInsteadOfZeroWhereEveryDrawLostAFlight) {
 }
 
 TEST_F(Fly, FliesWhatTheVehicleFileSays) {
-  const std::string stiff = changed_vehicle(*folder_, "stiff", {{"[6, 6, 15]", "[6, 6, 30]"}});
   const auto sag = [](const Outcome& flown) {
     return nlohmann::json::parse(flown.out)["flights"][0]["legs"][1]["mean_error_m"][2].get<double>();
   };
-  const double usual = sag(fly({"--json", "--experiment", "hover_xo_nc"}));
-  EXPECT_NEAR(sag(fly({"--json", "--experiment", "hover_xo_nc"}, coefficients_, stiff)) / usual, 0.5, 0.1)
+  const std::vector<std::string> hover{"--json", "--experiment", "hover_xo_nc"};
+  EXPECT_NEAR(sag(fly_changed({{"[6, 6, 15]", "[6, 6, 30]"}}, hover)) / sag(fly(hover)), 0.5, 0.1)
       << "half the height error for twice the gain";
-  const std::string heavy = changed_vehicle(*folder_, "heavy", {{"mass_kg: 0.60", "mass_kg: 2.60"}});
-  EXPECT_THAT(fly({}, coefficients_, heavy).err, HasSubstr("2.6 kg"));
+  EXPECT_THAT(fly_changed({{"mass_kg: 0.60", "mass_kg: 2.60"}}).err, HasSubstr("2.6 kg"));
 }
 
 TEST_F(Fly, RefusesWhatItCannotFlyWithOneLine) {
   struct Case {
-    const char* name;
-    std::vector<std::pair<std::string, std::string>> changes;
+    std::pair<std::string, std::string> change;
     std::vector<const char*> says;
   };
   for (const Case& refused : std::vector<Case>{
-           {"x_only", {{"  O: [180", "  P: [180"}}, {"shape O", "shapes_deg"}},
-           {"still", {{"dynamics:", "dynamic:"}}, {"dynamic is not a key"}},
-           {"slow", {{"speed_max_rpm: 19100", "speed_max_rpm: 9100"}}, {"speed_max_rpm"}},
-           {"spins", {{"[1, -1, 1, -1]", "[1, 1, 1, 1]"}}, {"rotor_spins"}},
-           {"by_area", {{"overlap: rim_arc", "overlap: area_share"}}, {"fitted with overlap rim_arc", "area_share"}},
+           {{"  O: [180", "  P: [180"}, {"shape O", "shapes_deg"}},
+           {{"dynamics:", "dynamic:"}, {"dynamic is not a key"}},
+           {{"speed_max_rpm: 19100", "speed_max_rpm: 9100"}, {"speed_max_rpm"}},
+           {{"[1, -1, 1, -1]", "[1, 1, 1, 1]"}, {"rotor_spins"}},
+           {{"overlap: rim_arc", "overlap: area_share"}, {"fitted with overlap rim_arc", "area_share"}},
        }) {
-    const Outcome flown = fly({}, coefficients_, changed_vehicle(*folder_, refused.name, refused.changes));
-    EXPECT_EQ(flown.code, 2) << refused.name;
+    const Outcome flown = fly_changed({refused.change});
+    EXPECT_EQ(flown.code, 2) << refused.change.second;
     EXPECT_EQ(std::count(flown.err.begin(), flown.err.end(), '\n'), 1) << flown.err;
     for (const char* part : refused.says) EXPECT_THAT(flown.err, HasSubstr(part));
   }
@@ -196,19 +183,13 @@ TEST_F(Fly, RefusesWhatItCannotFlyWithOneLine) {
 }
 
 TEST_F(Fly, AsksForTheSectionsThatOnlyAFlightNeeds) {
-  std::ostringstream read;
-  read << std::ifstream(kVehicle).rdbuf();
-  const std::string text = read.str();
-  const auto without = [&](const std::string& from, const std::string& to) {
-    const auto begin = text.find("\n" + from), end = to.empty() ? text.size() : text.find("\n" + to);
-    const std::string path = *folder_ / ("without_" + from.substr(0, 7) + ".yaml");
-    std::ofstream(path) << text.substr(0, begin + 1) << text.substr(std::min(end, text.size()));
-    return fly({}, coefficients_, path);
-  };
-  for (const auto& [section, next] : {std::pair{"dynamics:", "control:"}, {"control:", ""}}) {
-    const Outcome flown = without(section, next);
+  const std::string text = bytes_of(kVehicle);
+  const auto begin = text.find("\ndynamics:") + 1, end = text.find("\ncontrol:") + 1;
+  for (const auto& [section, words] :
+       {std::pair{text.substr(begin, end - begin), "no section dynamic"}, {text.substr(end), "no section control"}}) {
+    const Outcome flown = fly_changed({{section, ""}});
     EXPECT_EQ(flown.code, 2);
-    EXPECT_THAT(flown.err, HasSubstr("no section " + std::string(section).substr(0, 7)));
+    EXPECT_THAT(flown.err, HasSubstr(words));
   }
 }
 

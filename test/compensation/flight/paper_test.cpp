@@ -51,22 +51,14 @@ TEST(PaperTables, PointAtLegsOfTheirOwnShape) {
   for (const HoverRow& row : kHoverRows) {
     const Experiment& experiment = kExperiments[row.flight];
     EXPECT_TRUE(matches(row.final, experiment.legs[row.leg])) << experiment.name;
-    if (row.leg > 0) {
-      EXPECT_TRUE(matches(row.start, experiment.legs[row.leg - 1])) << experiment.name;
-    }
+    EXPECT_TRUE(row.leg == 0 || matches(row.start, experiment.legs[row.leg - 1])) << experiment.name;
   }
   for (const HeightRow& row : kHeightRows) EXPECT_TRUE(matches(row.final, kExperiments[row.flight].legs[row.leg]));
   for (const ForwardRow& row : kForwardRows) {
     const Experiment& experiment = kExperiments[row.flight];
     EXPECT_EQ(row.title.substr(0, 6) == "rising", experiment.path == Path::rising_circle);
-    if (row.x) {
-      EXPECT_TRUE(matches("X", experiment.legs[row.x->leg])) << experiment.name;
-    }
-    if (row.o_plain) {
-      EXPECT_TRUE(matches("O n.c.", experiment.legs[row.o_plain->leg])) << experiment.name;
-    }
-    if (row.o_compensated) {
-      EXPECT_TRUE(matches("O c.", experiment.legs[row.o_compensated->leg])) << experiment.name;
+    for (const auto& [name, cell] : {std::pair{"X", row.x}, {"O n.c.", row.o_plain}, {"O c.", row.o_compensated}}) {
+      EXPECT_TRUE(!cell || matches(name, experiment.legs[cell->leg])) << experiment.name << ", " << name;
     }
   }
 }

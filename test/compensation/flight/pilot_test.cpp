@@ -126,19 +126,20 @@ TEST(RateControl, CancelsTheGyroscopicTorque) {
   EXPECT_LT((torque - rates.cross(inertia * rates)).norm(), 1e-15);
 }
 
-Pilot example_pilot(const PilotSettings& settings = example_settings()) {
-  return *Pilot::build(example_vehicle(), bench_line(), settings);
-}
+Pilot example_pilot() { return *Pilot::build(example_vehicle(), bench_line(), example_settings()); }
 
-const BodyMotion kOnReference{{0, 0, kHeight}, {0, 0, 0}};
+/// Of a body that stands on its reference.
+Eigen::Vector4d speeds_on_reference(Pilot& pilot) {
+  pilot.look(Reference(), {{0, 0, kHeight}, {0, 0, 0}}, kLevel);
+  return pilot.act({0, 0, 0});
+}
 
 TEST(Pilot, CarriesTheWeightInEveryShape) {
   Pilot pilot = example_pilot();
   for (const Angles& shape :
        {compensation::shape_x(), compensation::shape_h(), compensation::shape_t(), compensation::shape_o()}) {
     pilot.set_arms(shape);
-    pilot.look(Reference(), kOnReference, Eigen::Quaterniond::Identity());
-    (void)pilot.act({0, 0, 0});
+    (void)speeds_on_reference(pilot);
     double sum = 0;
     for (const Newtons thrust : pilot.thrusts()) sum += thrust.value();
     EXPECT_NEAR(sum, 0.60 * kGravity, 1e-9);
@@ -151,8 +152,7 @@ TEST(Pilot, TurnsCoveredRotorsFasterOnlyWhenItCompensates) {
   const auto speeds_in = [&](const Angles& shape, bool on) {
     pilot.set_arms(shape);
     pilot.compensate(on);
-    pilot.look(Reference(), kOnReference, Eigen::Quaterniond::Identity());
-    return pilot.act({0, 0, 0});
+    return speeds_on_reference(pilot);
   };
   for (const Angles& open : {compensation::shape_x(), compensation::shape_h(), compensation::shape_t()}) {
     EXPECT_EQ(speeds_in(open, true), speeds_in(open, false)) << "nothing is covered in X, H and T: bit for bit";
@@ -167,8 +167,7 @@ TEST(Pilot, HoldsYawStillInOBecauseItAllocatesWithTheTorqueOfCoveredRotors) {
   const double k_t = bench_line().thrust_coefficient().value();
   for (const bool on : {true, false}) {
     pilot.compensate(on);
-    pilot.look(Reference(), kOnReference, Eigen::Quaterniond::Identity());
-    const Eigen::Vector4d squares = pilot.act({0, 0, 0}).cwiseAbs2();
+    const Eigen::Vector4d squares = speeds_on_reference(pilot).cwiseAbs2();
     const Build build = example_build();
     double yaw = 0;
     for (std::size_t i = 0; i < 4; ++i) {

@@ -47,10 +47,8 @@ TEST(MassProperties, OfASquareGivenAsAPolygonAreThoseOfTheSquare) {
 
 /// A plate cut off askew: its middle is not the origin, and its axes are not x and y.
 TEST(MassProperties, OfAnyConvexPlateAreThoseOfItsManySmallPieces) {
-  const compensation::Position corners[] = {{Metres(0.10), Metres(0.02)},
-                                            {Metres(0.03), Metres(0.07)},
-                                            {Metres(-0.08), Metres(0.04)},
-                                            {Metres(-0.02), Metres(-0.05)}};
+  using compensation::at;
+  const compensation::Position corners[] = {at(0.10, 0.02), at(0.03, 0.07), at(-0.08, 0.04), at(-0.02, -0.05)};
   Vehicle vehicle = example_vehicle();
   vehicle.airframe.polygon = compensation::square_as_polygon(Metres(0.045));
   vehicle.airframe.polygon->outline = *compensation::ConvexPolygon::from(corners, 4);
@@ -66,8 +64,7 @@ TEST(MassProperties, OfAnyConvexPlateAreThoseOfItsManySmallPieces) {
         const auto &a = corners[i], &b = corners[(i + 1) % 4];
         inside = inside && (b.x - a.x).value() * (y - a.y.value()) > (b.y - a.y).value() * (x - a.x.value());
       }
-      if (inside) pieces.emplace_back(x, y);
-      if (inside) middle += pieces.back();
+      if (inside) middle += pieces.emplace_back(x, y);
     }
   }
   middle /= static_cast<double>(pieces.size());
@@ -131,17 +128,18 @@ TEST(MassProperties, PutTheCentreOfGravityWhereTheOffsetPlatePutsIt) {
 
 const double kMorphSeconds = example_build().morph_s;
 
-TEST(ArmMotion, RestsWhereItBegan) {
+struct ArmMotionFromX : testing::Test {
   const Vehicle vehicle = example_vehicle();
-  const ArmMotion motion(vehicle.x, kMorphSeconds);
+  ArmMotion motion{vehicle.x, kMorphSeconds};
+};
+
+TEST_F(ArmMotionFromX, RestsWhereItBegan) {
   EXPECT_FALSE(motion.moving(0));
   EXPECT_EQ(motion.angles(0), vehicle.x);
   EXPECT_EQ(motion.rates(3), (std::array<double, 4>{}));
 }
 
-TEST(ArmMotion, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {
-  const Vehicle vehicle = example_vehicle();
-  ArmMotion motion(vehicle.x, kMorphSeconds);
+TEST_F(ArmMotionFromX, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {
   motion.begin(vehicle.o, 2.0);
   EXPECT_EQ(motion.angles(2.0), vehicle.x);
   EXPECT_TRUE(motion.moving(2.0 + kMorphSeconds - 1e-9));
@@ -152,9 +150,7 @@ TEST(ArmMotion, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {
   EXPECT_NEAR(motion.angles(2.0 + kMorphSeconds / 2)[0].value(), from_degrees(112.5).value(), 1e-12) << "half way";
 }
 
-TEST(ArmMotion, RatesAreTheDerivativeOfTheAngles) {
-  const Vehicle vehicle = example_vehicle();
-  ArmMotion motion(vehicle.x, kMorphSeconds);
+TEST_F(ArmMotionFromX, RatesAreTheDerivativeOfTheAngles) {
   motion.begin(vehicle.o, 0);
   for (double t = 0.1; t < kMorphSeconds; t += 0.1) {
     for (std::size_t i = 0; i < 4; ++i) {

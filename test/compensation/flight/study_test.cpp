@@ -1,9 +1,6 @@
 #include "compensation/flight/study.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <set>
 
 #include "test/compensation/flight/flight_fixture.hpp"
 
@@ -100,17 +97,20 @@ TEST(Findings, TakeTheSizeOfTheHeightErrorWhicheverSideItIsOn) {
   EXPECT_NEAR(of(found, "hover_z_ratio").p50, 0.5, 1e-12);
   EXPECT_NEAR(of(found, "hover_z_compensated_m").p50, -0.1, 1e-12) << "but tell the side";
   EXPECT_EQ(found.hover_z_better, 1);
+  const Findings harmed = findings_of({made_up(0.5), made_up(1.5)});
+  EXPECT_EQ(harmed.hover_z_better, 0.5) << "a compensation that harms is worse";
+  EXPECT_EQ(harmed.forward_better, 0.5);
 }
 
 TEST(Findings, CountALostFlightAgainstTheSideThatLostIt) {
-  Draw lost_plain = made_up(0.5), lost_compensated = made_up(0.5), lost_in_x = made_up(0.5);
-  lost_plain.flights[kHoverPlain].lost = true;
-  lost_plain.flights[kHoverPlain].lost_leg = 1;
-  lost_compensated.flights[kLevelSwitched].lost = true;
-  lost_compensated.flights[kLevelSwitched].lost_leg = 1;
-  lost_in_x.flights[kLevelPlain].lost = true;
-  lost_in_x.flights[kLevelPlain].lost_leg = 0;
-  const Findings found = findings_of({made_up(0.5), lost_plain, lost_compensated, lost_in_x});
+  const auto lost_in = [](ExperimentIndex flight, std::size_t leg) {
+    Draw draw = made_up(0.5);
+    draw.flights[flight].lost = true;
+    draw.flights[flight].lost_leg = leg;
+    return draw;
+  };
+  const Draw plain = lost_in(kHoverPlain, 1), compensated = lost_in(kLevelSwitched, 1), in_x = lost_in(kLevelPlain, 0);
+  const Findings found = findings_of({made_up(0.5), plain, compensated, in_x});
   EXPECT_EQ(found.draws, 4u);
   EXPECT_EQ(found.kept, 1u);
   EXPECT_EQ(found.by_law[0].kept, 1u);
@@ -120,12 +120,6 @@ TEST(Findings, CountALostFlightAgainstTheSideThatLostIt) {
   EXPECT_EQ(found.lost_compensated, 2u);
   EXPECT_EQ(found.forward_better, 0.5) << "the whole one, and the one that only compensation saved";
   EXPECT_EQ(of(found, "forward_ratio").p50, 0.5);
-}
-
-TEST(Findings, CountACompensationThatHarmsAsWorse) {
-  const Findings found = findings_of({made_up(0.5), made_up(1.5)});
-  EXPECT_EQ(found.hover_z_better, 0.5);
-  EXPECT_EQ(found.forward_better, 0.5);
 }
 
 Scene drawn(std::size_t index, std::uint64_t seed = 1) { return drawn_scene(example_scene(seed), index); }

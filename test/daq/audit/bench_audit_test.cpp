@@ -1,32 +1,24 @@
 #include "daq/audit/bench_audit.hpp"
 
-#include <gmock/gmock.h>
-
-#include "base/error.hpp"
-#include "daq/campaign/campaign_run.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
-#include "results/journal.hpp"
-#include "test/daq/bench_fixture.hpp"
+#include "test/daq/campaign_on_bench.hpp"
 
 namespace kphi::daq {
 namespace bench_audit_test {
 
 using testing::HasSubstr;
 
-class BenchAudit : public testing::Test {
+class BenchAudit : public CampaignOnBench {
  protected:
   /// Words of the refusal; empty when there is none.
   std::string refusal() {
-    DeterministicBench bench(config_);
-    try {
-      found_ = audit_bench(bench, campaign_, config_);
-      return "";
-    } catch (const ConfigurationError& error) {
-      return error.what();
-    }
+    bench_.emplace(config_);
+    bench_->simulation().netbox().configure(settings_);
+    (void)bench_->load_cell().start();  // reads the configuration
+    bench_->load_cell().stop();
+    found_.clear();
+    return test::words_of<ConfigurationError>([&] { return found_ = audit_bench(*bench_, campaign_, config_); });
   }
-  profiles::Campaign campaign_ = test::short_campaign();
-  profiles::BenchConfig config_ = test::deterministic_config(1);
+  sim::NetBoxSettings settings_;
   std::vector<BenchFinding> found_;
 };
 
@@ -52,53 +44,20 @@ TEST_F(BenchAudit, TellsFaultsOfBothDevicesAtOnce) {
 TEST_F(BenchAudit, SaysAWarningOnceAndJournalsIt) {
   campaign_ = test::short_campaign("0", 1, 2);
   campaign_.limits["coil_temperature_max_degc"] = 190;
-  test::SaidLines said;
-  const test::TemporaryFolder folder;
-  const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
-  DeterministicBench bench(config_);
-  AutoConfirmOperator person;
-  (void)run_campaign(bench, campaign_, config_, results, person, said, [] { return false; });
-  std::erase_if(said.lines, [](const std::string& line) { return !line.starts_with("motor: warning"); });
-  EXPECT_THAT(said.lines, testing::ElementsAre(HasSubstr("motor: warning: the module derates above")));
-  const auto entry = results::read_journal(results.journal()).entries.at(1);
+  (void)run();
+  std::erase_if(said_.lines, [](const std::string& line) { return !line.starts_with("motor: warning"); });
+  EXPECT_THAT(said_.lines, testing::ElementsAre(HasSubstr("motor: warning: the module derates above")));
+  const auto entry = journal().at(1);
   EXPECT_EQ(entry.event, "motor_finding");
   EXPECT_EQ(entry.data.at("severity"), "warning");
 }
 
-class Audit : public testing::Test {
- protected:
-  /// Words of the refusal; empty when there is none.
-  std::string refusal() {
-    DeterministicBench bench(config_);
-    bench.simulation().netbox().configure(settings_);
-    (void)bench.load_cell().start();  // reads the configuration
-    bench.load_cell().stop();
-    found_.clear();
-    try {
-      for (const BenchFinding& found : audit_bench(bench, campaign_, config_))
-        if (found.device == Source::load_cell) found_.push_back(found);
-      return "";
-    } catch (const ConfigurationError& error) {
-      return error.what();
-    }
-  }
-  profiles::Campaign campaign_ = test::short_campaign();
-  profiles::BenchConfig config_ = test::deterministic_config(1);
-  sim::NetBoxSettings settings_;
-  std::vector<BenchFinding> found_;
-};
-
-TEST_F(Audit, LetsAWellSetBoxPass) {
-  EXPECT_EQ(refusal(), "");
-  EXPECT_TRUE(found_.empty());
-}
-
-TEST_F(Audit, RefusesARateThatFoldsAStepIntoAConstantForce) {
+TEST_F(BenchAudit, RefusesARateThatFoldsAStepIntoAConstantForce) {
   settings_.rate_hz = config_.netbox.rate_hz = 100;
   EXPECT_THAT(refusal(), AllOf(HasSubstr("6000.0 RPM"), HasSubstr("set the RDT output rate to 7000 Hz")));
 }
 
-TEST_F(Audit, RefusesALineThatIsConstantOverTheShortWindowsOfTheCampaign) {
+TEST_F(BenchAudit, RefusesALineThatIsConstantOverTheShortWindowsOfTheCampaign) {
   campaign_.profile.steps = 2;
   campaign_.profile.first = from_rpm(9900);
   settings_.rate_hz = config_.netbox.rate_hz = 500;
@@ -108,7 +67,7 @@ TEST_F(Audit, RefusesALineThatIsConstantOverTheShortWindowsOfTheCampaign) {
   EXPECT_EQ(refusal(), "");
 }
 
-TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
+TEST_F(BenchAudit, RefusesALimitOfThrustThatTheCellCannotBear) {
   campaign_.limits["thrust_max_n"] = 60;
   EXPECT_THAT(refusal(), HasSubstr("60 N expected on Fz, its range is 60 N"));
   campaign_.limits["thrust_max_n"] = 50;
@@ -119,7 +78,7 @@ TEST_F(Audit, RefusesALimitOfThrustThatTheCellCannotBear) {
             "on the box's Configurations page, or lower the speeds");
 }
 
-TEST_F(Audit, RefusesSettingsThatAreNotTheBoxs) {
+TEST_F(BenchAudit, RefusesSettingsThatAreNotTheBoxs) {
   settings_.filter = 5;
   config_.netbox.settings.filter_hz = 35;
   EXPECT_EQ(refusal(), "");
@@ -130,7 +89,7 @@ TEST_F(Audit, RefusesSettingsThatAreNotTheBoxs) {
   EXPECT_THAT(refusal(), HasSubstr("where it is number 4"));
 }
 
-TEST_F(Audit, WarnsOfAnotherBufferSize) {
+TEST_F(BenchAudit, WarnsOfAnotherBufferSize) {
   settings_.records_per_datagram = 10;
   EXPECT_EQ(refusal(), "");
   EXPECT_THAT(found_.at(0).finding.what, HasSubstr("10 records per datagram"));

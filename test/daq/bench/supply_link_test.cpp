@@ -8,22 +8,14 @@
 namespace kphi::daq {
 namespace supply_link_test {
 
-TEST(OutputEnable, HoldsThePowerWhileItLives) {
+TEST(OutputEnable, HoldsThePowerWhileItLivesAlsoOnTheWayOutOfAnException) {
   QueueSupply supply;
-  {
+  const auto fail = [&] {
     const OutputEnable powered(supply);
     EXPECT_TRUE(supply.on);
-  }
-  EXPECT_FALSE(supply.on);
-}
-
-TEST(OutputEnable, SwitchesOffOnTheWayOutOfAnException) {
-  QueueSupply supply;
-  try {
-    const OutputEnable powered(supply);
     throw std::runtime_error("something else");
-  } catch (const std::runtime_error&) {
-  }
+  };
+  EXPECT_THROW(fail(), std::runtime_error);
   EXPECT_FALSE(supply.on);
 }
 

@@ -1,19 +1,7 @@
 // Whole campaigns on the deterministic bench, each in another order.
 #include "daq/campaign/campaign_review.hpp"
 
-#include <gmock/gmock.h>
-
-#include <nlohmann/json.hpp>
-
-#include "daq/campaign/campaign_run.hpp"
-#include "daq/virtual/deterministic_bench.hpp"
-#include "results/campaign_folder.hpp"
-#include "results/journal.hpp"
-#include "results/reduction/reduction.hpp"
-#include "results/reduction/repetitions.hpp"
-#include "results/run_reader.hpp"
-#include "results/steps_csv.hpp"
-#include "test/daq/bench_fixture.hpp"
+#include "test/daq/campaign_on_bench.hpp"
 
 namespace kphi::daq {
 namespace campaign_review_test {
@@ -23,7 +11,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-class OrderedCampaign : public testing::Test {
+class OrderedCampaign : public CampaignOnBench {
  protected:
   /// Steps long enough to settle. `more`: further lines of the campaign file.
   static profiles::Campaign campaign(const std::string& occlusions, int repetitions, const std::string& more,
@@ -39,43 +27,10 @@ class OrderedCampaign : public testing::Test {
                     occlusions, repetitions, last_rpm, more_profile, more),
         "ordered.yaml");
   }
-  CampaignResult run(const profiles::Campaign& campaign) {
-    return run_campaign(*bench_, campaign, config_, results_, person_, said_, [] { return false; });
-  }
-  /// Another simulated motor; `rest` of its file.
-  void use_motor(const std::string& rest) {
-    std::ofstream(folder_.path() / "motor.yaml") << "format: kphi-sim-motor/1\n" << rest;
-    std::string text = config_.text;
-    text.replace(text.find("in_process: true"), 16, "in_process: true, motor: motor.yaml");
-    config_ = profiles::parse_bench(text, (folder_.path() / "bench.yaml").string());
-    bench_ = std::make_unique<DeterministicBench>(config_);
-  }
-  /// Data of the journal's entries of one event.
-  std::vector<json> events(const std::string& event) {
-    std::vector<json> found;
-    for (const auto& entry : results::read_journal(results_.journal()).entries) {
-      if (entry.event == event) found.push_back(entry.data);
-    }
-    return found;
-  }
   std::vector<std::string> runs_in_order() {
     std::vector<std::string> names;
-    for (const json& data : events("run_accepted")) names.push_back(data.at("file").get<std::string>().substr(5));
+    for (const json& data : journaled("run_accepted")) names.push_back(data.at("file").get<std::string>().substr(5));
     return names;
-  }
-  std::vector<results::StepMean> replayed(const std::vector<std::filesystem::path>& runs) {
-    std::vector<results::StepMean> again;
-    for (const auto& file : runs) {
-      for (const auto& step : reduce(results::read_run(file))) again.push_back(step);
-    }
-    return again;
-  }
-  void expect_whole_and_replayable(const profiles::Campaign& campaign) {
-    const auto verification = results::verify_campaign(results_);
-    EXPECT_TRUE(verification.whole()) << verification.problems.front();
-    const auto again = replayed(results_.complete_runs(campaign.occlusions_deg));
-    EXPECT_EQ(test::bytes_of(results_.steps()), results::format_steps(again));
-    EXPECT_EQ(test::bytes_of(results_.means()), results::format_steps(means_of(again)));
   }
   /// Pretends that somebody moved the occlusion, unasked, once a line says `when`.
   void move_occlusion(const std::string& when, double to_deg) {
@@ -84,13 +39,11 @@ class OrderedCampaign : public testing::Test {
       if (line.find(when) != std::string::npos) bench_->mounted("5x3", to_deg);
     };
   }
-
-  test::TemporaryFolder folder_;
-  profiles::BenchConfig config_ = test::deterministic_config(2);
-  std::unique_ptr<DeterministicBench> bench_ = std::make_unique<DeterministicBench>(config_);
-  results::CampaignFolder results_ = results::CampaignFolder::create(folder_.path(), "20210530T000000Z", "ordered");
-  test::ScriptedOperator person_;
-  test::SaidLines said_;
+  /// As if the occlusion had stood elsewhere during the second of several runs.
+  void spoil_second_run() {
+    move_occlusion("5x3_phi000_rep1.h5", 20);
+    move_occlusion("5x3_phi000_rep2.h5", 0);
+  }
 };
 
 std::vector<double> speeds_rpm(const std::filesystem::path& run) {
@@ -102,143 +55,128 @@ std::vector<double> speeds_rpm(const std::filesystem::path& run) {
 }
 
 TEST_F(OrderedCampaign, ShuffledByASeedAsksForOneMountingPerBlockAndLeavesTheSameFiles) {
-  const auto shuffled = campaign("0, 90, 270", 2, "order: {runs: shuffled, seed: 4}\n");
-  (void)run(shuffled);
-  const auto plan = profiles::make_plan(shuffled, config_);
+  (void)run(campaign("0, 90, 270", 2, "order: {runs: shuffled, seed: 4}\n"));
+  const auto plan = profiles::make_plan(campaign_, config_);
   EXPECT_NE(plan.mounting_angles(), (std::vector<double>{0, 90, 270})) << "choose a seed that shuffles";
   EXPECT_EQ(person_.mounted_deg, plan.mounting_angles());
   std::vector<std::string> planned;
   for (const auto& one : plan.runs) planned.push_back(results::run_file_name("5x3", one.occlusion_deg, one.repetition));
   EXPECT_EQ(runs_in_order(), planned);
-  const auto steps = results::read_steps(results_.steps());
-  ASSERT_EQ(steps.size(), 24u);
-  EXPECT_EQ(steps.front().occlusion_deg, 0) << "rows are as listed, whatever the order of the runs";
-  EXPECT_EQ(steps.back().occlusion_deg, 270);
-  expect_whole_and_replayable(shuffled);
+  ASSERT_EQ(steps().size(), 24u);
+  EXPECT_EQ(steps().front().occlusion_deg, 0) << "rows are as listed, whatever the order of the runs";
+  EXPECT_EQ(steps().back().occlusion_deg, 270);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, MountedAnewForEachRunAsksEachTime) {
-  const auto anew = campaign("0, 90", 2, "order: {runs: shuffled, seed: 3, remount_each_repetition: true}\n");
-  (void)run(anew);
+  (void)run(campaign("0, 90", 2, "order: {runs: shuffled, seed: 3, remount_each_repetition: true}\n"));
   EXPECT_EQ(person_.mounted_deg.size(), 4u);
-  EXPECT_EQ(events("mounted").size(), 4u);
-  expect_whole_and_replayable(anew);
+  EXPECT_EQ(journaled("mounted").size(), 4u);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, DownwardsBeginsAtTheTopAndNumbersLevelsAsEver) {
-  const auto down = campaign("0", 1, "order: {steps: down}\n");
-  (void)run(down);
-  EXPECT_THAT(speeds_rpm(results_.complete_runs().at(0)), ElementsAre(15000, 13000, 11000, 9000));
-  const auto steps = results::read_steps(results_.steps());
-  EXPECT_EQ(steps.front().step, 3);
-  EXPECT_EQ(steps.back().step, 0);
-  expect_whole_and_replayable(down);
+  (void)run(campaign("0", 1, "order: {steps: down}\n"));
+  EXPECT_THAT(speeds_rpm(runs().at(0)), ElementsAre(15000, 13000, 11000, 9000));
+  EXPECT_EQ(steps().front().step, 3);
+  EXPECT_EQ(steps().back().step, 0);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, ShuffledStepsDifferFromRunToRunAndAreAveragedByLevel) {
-  const auto shuffled = campaign("0", 3, "order: {steps: shuffled, seed: 8}\n");
-  (void)run(shuffled);
-  const auto runs = results_.complete_runs();
-  EXPECT_NE(speeds_rpm(runs.at(0)), speeds_rpm(runs.at(1)));
-  for (const auto& mean : results::read_steps(results_.means()))
+  (void)run(campaign("0", 3, "order: {steps: shuffled, seed: 8}\n"));
+  EXPECT_NE(speeds_rpm(runs().at(0)), speeds_rpm(runs().at(1)));
+  for (const auto& mean : means())
     EXPECT_NEAR(to_rpm(RadPerSec(mean.commanded_speed_rad_s)), 9000 + 2000 * mean.step, 1e-6);
-  for (const auto& step : results::read_steps(results_.steps()))
+  for (const auto& step : steps())
     EXPECT_NEAR(step.speed_rad_s / step.commanded_speed_rad_s, 1, 0.01)
         << results::quality_flag_names(step.quality_flags);
-  expect_whole_and_replayable(shuffled);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, UpAndDownTellsTheHysteresisOfEachRun) {
-  const auto both = campaign("0, 90", 1, "order: {steps: up_and_down}\n");
-  (void)run(both);
-  EXPECT_THAT(speeds_rpm(results_.complete_runs().at(0)), ElementsAre(9000, 11000, 13000, 15000, 13000, 11000, 9000));
-  const auto told = events("hysteresis");
+  (void)run(campaign("0, 90", 1, "order: {steps: up_and_down}\n"));
+  EXPECT_THAT(speeds_rpm(runs().at(0)), ElementsAre(9000, 11000, 13000, 15000, 13000, 11000, 9000));
+  const auto told = journaled("hysteresis");
   ASSERT_EQ(told.size(), 2u);
   EXPECT_EQ(told[0].at("run"), "5x3_phi000_rep1.h5");
   EXPECT_EQ(told[0].at("speeds").size(), 3u);
   EXPECT_LT(std::abs(told[0].at("share_of_k").get<double>()), 0.003) << "the simulated propeller has none";
   EXPECT_THAT(said_.lines, Contains(HasSubstr("5x3_phi000_rep1.h5: thrust going up minus going down: ")));
-  expect_whole_and_replayable(both);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, ReferenceRunsStandApartAndTellWhatDrifted) {
-  const auto referenced = campaign("90", 1, "order: {reference: true}\n");
   move_occlusion("5x3_phi090_rep1.h5", 0);  // the last reference run is asked for next: mounted() then says 0
-  (void)run(referenced);
+  (void)run(campaign("90", 1, "order: {reference: true}\n"));
   EXPECT_THAT(person_.mounted_deg, ElementsAre(0, 90, 0));
   EXPECT_THAT(runs_in_order(), ElementsAre("5x3_phi000_ref1.h5", "5x3_phi090_rep1.h5", "5x3_phi000_ref2.h5"));
-  for (const auto& step : results::read_steps(results_.steps())) EXPECT_EQ(step.occlusion_deg, 90);
-  const auto references = results::read_steps(results_.references());
+  for (const auto& step : steps()) EXPECT_EQ(step.occlusion_deg, 90);
+  const auto references = results::read_steps(results_->references());
   ASSERT_EQ(references.size(), 8u);
   EXPECT_EQ(references.front().repetition, -1);
   EXPECT_EQ(references.back().repetition, -2);
-  EXPECT_EQ(test::bytes_of(results_.references()), results::format_steps(replayed(results_.reference_runs())));
-  const auto drift = events("reference_drift");
+  EXPECT_EQ(test::bytes_of(results_->references()), results::format_steps(steps_of(results_->reference_runs())));
+  const auto drift = journaled("reference_drift");
   ASSERT_EQ(drift.size(), 1u);
   EXPECT_EQ(drift[0].at("drifted"), false) << drift[0];
   EXPECT_THAT(said_.lines.back(), HasSubstr("from the first to the last reference run k changed by"));
-  expect_whole_and_replayable(referenced);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, SaysWhenTheBenchHasDriftedBetweenTheReferenceRuns) {
-  const auto referenced = campaign("0", 1, "order: {reference: true}\n");
   move_occlusion("5x3_phi000_rep1.h5", 20);  // no mounting is asked for: whoever bumps the plate is not noticed
-  (void)run(referenced);
+  (void)run(campaign("0", 1, "order: {reference: true}\n"));
   EXPECT_THAT(person_.mounted_deg, ElementsAre(0));
-  EXPECT_EQ(events("reference_drift").at(0).at("drifted"), true);
-  EXPECT_LT(events("reference_drift").at(0).at("share").get<double>(), -0.02);
+  EXPECT_EQ(journaled("reference_drift").at(0).at("drifted"), true);
+  EXPECT_LT(journaled("reference_drift").at(0).at("share").get<double>(), -0.02);
   EXPECT_THAT(said_.lines.back(), HasSubstr("the bench has drifted"));
 }
 
 TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndKeepsIt) {
   const auto three = campaign("0", 3, "");
-  move_occlusion("5x3_phi000_rep1.h5", 20);
-  move_occlusion("5x3_phi000_rep2.h5", 0);
+  spoil_second_run();
   const CampaignResult result = run(three);
   EXPECT_EQ(result.runs, 4);
   ASSERT_EQ(person_.questions.size(), 1u) << "then three agree";
   EXPECT_THAT(person_.questions[0].reason, HasSubstr("repetition 2"));
   EXPECT_EQ(person_.mounted_deg.size(), 1u);
-  EXPECT_EQ(results::read_steps(results_.steps()).size(), 16u) << "it stays on record";
-  const auto means = results::read_steps(results_.means());
-  EXPECT_TRUE(std::isnan(means.at(0).repetitions_left_out)) << "being far from the others is no cause";
-  const auto judged = events("repetitions_judged");
+  EXPECT_EQ(steps().size(), 16u) << "it stays on record";
+  EXPECT_TRUE(std::isnan(means().at(0).repetitions_left_out)) << "being far from the others is no cause";
+  const auto judged = journaled("repetitions_judged");
   ASSERT_EQ(judged.size(), 2u);
   EXPECT_EQ(judged[1].at("repetitions").at(1).at("outlying"), true);
-  EXPECT_EQ(events("another_run").at(0).at("decided"), true);
+  EXPECT_EQ(journaled("another_run").at(0).at("decided"), true);
   EXPECT_THAT(said_.lines, Contains(HasSubstr("run  4/4  5x3_phi000_rep4.h5")));
-  expect_whole_and_replayable(three);
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, DoesNotRunAgainWhenThePersonOrTheCampaignSaysNo) {
-  move_occlusion("5x3_phi000_rep1.h5", 20);
-  move_occlusion("5x3_phi000_rep2.h5", 0);
+  spoil_second_run();
   person_.decision = false;
   EXPECT_EQ(run(campaign("0", 3, "")).runs, 3);
   EXPECT_EQ(person_.questions.size(), 1u);
-  EXPECT_EQ(events("another_run").at(0).at("decided"), false);
-  EXPECT_TRUE(std::isnan(results::read_steps(results_.means()).at(0).repetitions_left_out));
+  EXPECT_EQ(journaled("another_run").at(0).at("decided"), false);
+  EXPECT_TRUE(std::isnan(means().at(0).repetitions_left_out));
 }
 
 TEST_F(OrderedCampaign, NeverAsksBeyondWhatTheCampaignAllows) {
-  move_occlusion("5x3_phi000_rep1.h5", 20);
-  move_occlusion("5x3_phi000_rep2.h5", 0);
+  spoil_second_run();
   EXPECT_EQ(run(campaign("0", 3, "repetitions_extra_max: 0\n")).runs, 3);
   EXPECT_TRUE(person_.questions.empty());
   EXPECT_THAT(said_.lines, Contains(HasSubstr("0°: repetition 2 gives a k that is")));
 }
 
 TEST_F(OrderedCampaign, ChangesTheSpeedNoFasterThanItsSlewAndAveragesNoRamp) {
-  const auto slewed = campaign("0", 1, "order: {steps: up_and_down}\n", ", slew_rpm_s: 4000");
-  (void)run(slewed);
-  const auto recording = results::read_run(results_.complete_runs().at(0));
-  const auto plan = profiles::make_plan(slewed, config_);
+  (void)run(campaign("0", 1, "order: {steps: up_and_down}\n", ", slew_rpm_s: 4000"));
+  const auto recording = results::read_run(runs().at(0));
+  const auto plan = profiles::make_plan(campaign_, config_);
   double ramps_s = 0;
   for (std::size_t i = 0; i + 1 < recording.phases.size(); ++i) {
     if (recording.phases[i].phase == results::Phase::ramp)
       ramps_s += 1e-9 * static_cast<double>(recording.phases[i + 1].time_ns - recording.phases[i].time_ns);
   }
-  EXPECT_NEAR(ramps_s, ramp_time(slewed.profile, plan.runs[0]).value(), 0.1);
+  EXPECT_NEAR(ramps_s, ramp_time(campaign_.profile, plan.runs[0]).value(), 0.1);
   EXPECT_NEAR(ramps_s, 9000 / 4000.0 + 6 * 2000 / 4000.0, 0.1);
   double last_s = 0, last = 0;
   for (const auto& reading : recording.motor) {
@@ -251,15 +189,16 @@ TEST_F(OrderedCampaign, ChangesTheSpeedNoFasterThanItsSlewAndAveragesNoRamp) {
     }
     last_s = now_s, last = rpm;
   }
-  for (const auto& step : results::read_steps(results_.steps())) {
+  for (const auto& step : steps()) {
     EXPECT_EQ(results::quality_flag_names(step.quality_flags), "") << step.step;
     EXPECT_NEAR(step.speed_rad_s / step.commanded_speed_rad_s, 1, 0.002);
   }
-  expect_whole_and_replayable(slewed);
+  expect_whole();
 }
 
 std::string motor_on(double volts) {
-  return fmt::format("supply: {{voltage_v: {}}}\nsensors: {{voltage_gain_error_relative: 0}}\n", volts);
+  return fmt::format(
+      "format: kphi-sim-motor/1\nsupply: {{voltage_v: {}}}\nsensors: {{voltage_gain_error_relative: 0}}\n", volts);
 }
 
 TEST_F(OrderedCampaign, LearnsFromASaturatedMotorHowFastLaterRunsMayGo) {
@@ -267,17 +206,17 @@ TEST_F(OrderedCampaign, LearnsFromASaturatedMotorHowFastLaterRunsMayGo) {
   auto weak = campaign("0, 90", 1, "", "", 18000);
   weak.supply = Volts(8.3);
   (void)run(weak);
-  const auto caps = events("speed_cap");
-  ASSERT_EQ(caps.size(), 1u) << test::bytes_of(results_.steps());
+  const auto caps = journaled("speed_cap");
+  ASSERT_EQ(caps.size(), 1u) << test::bytes_of(results_->steps());
   EXPECT_EQ(caps[0].at("run"), "5x3_phi000_rep1.h5");
   EXPECT_THAT(said_.lines, Contains(HasSubstr("motor: full drive gives ")));
   const double cap_rpm = to_rpm(RadPerSec(caps[0].at("cap_rad_s").get<double>()));
-  const auto second = speeds_rpm(results_.complete_runs(weak.occlusions_deg).at(1));
-  EXPECT_EQ(speeds_rpm(results_.complete_runs(weak.occlusions_deg).at(0)).size(), 4u);
+  const auto second = speeds_rpm(runs().at(1));
+  EXPECT_EQ(speeds_rpm(runs().at(0)).size(), 4u);
   EXPECT_LT(second.size(), 4u);
   EXPECT_NEAR(second.back(), cap_rpm, 1);
-  EXPECT_EQ(events("run_accepted").at(1).at("steps_left_out"), 4 - second.size());
-  expect_whole_and_replayable(weak);
+  EXPECT_EQ(journaled("run_accepted").at(1).at("steps_left_out"), 4 - second.size());
+  expect_whole();
 }
 
 TEST_F(OrderedCampaign, LeavesOutWhatIsAboveASaturatedStepInTheSameRun) {
@@ -288,9 +227,8 @@ TEST_F(OrderedCampaign, LeavesOutWhatIsAboveASaturatedStepInTheSameRun) {
   (void)run(weak);
   EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^motor: full drive gives [0-9]+ of [0-9]+ RPM; "
                                                            "skipping [0-9]+ steps at or above$")));
-  const auto steps = results::read_steps(results_.steps());
   std::vector<results::StepMean> first, second;
-  for (const auto& step : steps) (step.repetition == 1 ? first : second).push_back(step);
+  for (const auto& step : steps()) (step.repetition == 1 ? first : second).push_back(step);
   const auto fell_short = [](const results::StepMean& step) {
     return (step.quality_flags & static_cast<std::uint32_t>(results::QualityFlag::speed_not_reached)) != 0;
   };
@@ -301,10 +239,10 @@ TEST_F(OrderedCampaign, LeavesOutWhatIsAboveASaturatedStepInTheSameRun) {
   });
   EXPECT_TRUE(fell_short(*fastest)) << "nothing above it was tried";
   EXPECT_LT(to_rpm(RadPerSec(fastest->commanded_speed_rad_s)), 17500);
-  EXPECT_EQ(events("run_accepted").at(0).at("steps_left_out"), 13 - first.size());
-  EXPECT_EQ(events("run_accepted").at(1).at("steps_left_out"), 13 - second.size());
-  EXPECT_EQ(events("speed_cap").size(), 1u);
-  expect_whole_and_replayable(weak);
+  EXPECT_EQ(journaled("run_accepted").at(0).at("steps_left_out"), 13 - first.size());
+  EXPECT_EQ(journaled("run_accepted").at(1).at("steps_left_out"), 13 - second.size());
+  EXPECT_EQ(journaled("speed_cap").size(), 1u);
+  expect_whole();
 }
 
 /// What one run leaves in the coil of the motor that is built in: some degrees, for the better part of a minute.
@@ -312,16 +250,15 @@ TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
   auto warm = campaign("0", 2, "", "", 18000);
   warm.limits.cooling = profiles::Cooling{Celsius(27), Celsius(26.5)};
   (void)run(warm);
-  const auto cooling = events("cooling"), cooled = events("cooled_down");
+  const auto cooling = journaled("cooling"), cooled = journaled("cooled_down");
   ASSERT_EQ(cooling.size(), 1u) << "the first run begins cold, the second warm";
   ASSERT_EQ(cooled.size(), 1u) << "the pause ends";
   EXPECT_GT(cooling[0].at("coil_degc").get<double>(), 27);
   EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^coil at [0-9]+ ..C: pausing until below 26.5 ..C$")));
   const double paused_s = cooled[0].at("seconds").get<double>();
   EXPECT_GT(paused_s, 1);
-  const auto runs = results_.complete_runs(warm.occlusions_deg);
-  ASSERT_EQ(runs.size(), 2u);
-  const auto before = results::read_run(runs[0]), after = results::read_run(runs[1]);
+  ASSERT_EQ(runs().size(), 2u);
+  const auto before = recording(0), after = recording(1);
   const auto coil_degc = [](const results::RunRecording& run) {
     std::vector<double> all;
     for (const auto& reading : run.motor)
@@ -337,10 +274,11 @@ TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
 }
 
 TEST_F(OrderedCampaign, JournalsWhatWasAskedAndAnswered) {
-  const auto one = campaign("0", 1, "");
+  campaign_ = campaign("0", 1, "");
+  prepare();
   AutoConfirmOperator robot;
-  (void)run_campaign(*bench_, one, config_, results_, robot, said_, [] { return false; });
-  EXPECT_EQ(events("mounted").at(0).at("confirmed_by"), "--yes");
+  (void)run_campaign(*bench_, campaign_, config_, *results_, robot, said_, test::never);
+  EXPECT_EQ(journaled("mounted").at(0).at("confirmed_by"), "--yes");
 }
 
 }  // namespace campaign_review_test

@@ -1,15 +1,14 @@
 #include "daq/campaign/operator.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <array>
-#include <cstdlib>
 
 #include "base/error.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
+#include "test/daq/bench_fixture.hpp"
 
 namespace kphi::daq {
 namespace operator_test {
@@ -18,41 +17,31 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
+const profiles::Propeller kPropeller{"5x3", "Test 5 inch", 5, 3};
+
 class Prompt : public testing::Test {
  protected:
-  Prompt() {
-    EXPECT_EQ(pipe(pipe_.data()), 0);
-    words_ = open_memstream(&text_, &size_);
-  }
-  ~Prompt() override {
-    close(pipe_[0]);
-    std::fclose(words_);
-    std::free(text_);
-  }
+  Prompt() { EXPECT_EQ(pipe(pipe_.data()), 0); }
+  ~Prompt() override { close(pipe_[0]); }
   void answer(const std::string& typed) {
     EXPECT_EQ(write(pipe_[1], typed.data(), typed.size()), static_cast<ssize_t>(typed.size()));
     close(pipe_[1]);
   }
   void mount(double occlusion_deg) {
     const MountConfirmation mounted =
-        person().confirm_mounting({"5x3", "Test 5 inch", 5, 3}, occlusion_deg, "The supply's output is off.");
+        person().confirm_mounting(kPropeller, occlusion_deg, "The supply's output is off.");
     EXPECT_EQ(mounted.occlusion_deg(), occlusion_deg);
   }
   bool run_again() { return person().run_again({90, "repetition 2 is 3 % off", 1, 2}); }
   TerminalOperator person() {
-    TerminalOperator person(pipe_[0], words_, [this] { return stop_; });
+    TerminalOperator person(pipe_[0], words_.stream, [this] { return stop_; });
     person.log_to([this](const char* event, const std::string& words) { record_.push_back(event + (": " + words)); });
     return person;
   }
-  std::string said() {
-    std::fflush(words_);
-    return {text_, size_};
-  }
+  std::string said() { return words_.text(); }
 
   std::array<int, 2> pipe_{};
-  char* text_ = nullptr;
-  std::size_t size_ = 0;
-  std::FILE* words_ = nullptr;
+  test::Written words_;
   bool stop_ = false;
   std::vector<std::string> record_;
 };
@@ -60,38 +49,31 @@ class Prompt : public testing::Test {
 TEST_F(Prompt, NamesWhatToMountAndWhatMotorAndSupplyDo) {
   answer("90\n");
   mount(90);
-  EXPECT_NE(said().find("Mount the 90° occlusion under propeller 5x3"), std::string::npos) << said();
-  EXPECT_THAT(said(), StartsWith("\nThe supply's output is off.\nMount"));
+  EXPECT_THAT(said(), StartsWith("\nThe supply's output is off.\nMount the 90° occlusion under propeller 5x3"));
 }
 
 TEST_F(Prompt, SaysNoOcclusionForZero) {
   answer("0\n");
   mount(0);
-  EXPECT_NE(said().find("Mount no occlusion"), std::string::npos);
+  EXPECT_THAT(said(), HasSubstr("Mount no occlusion"));
 }
 
 TEST_F(Prompt, AsksAgainAfterAWrongAngle) {
   answer("45\nninety\n\n90 \n90\n");
   mount(90);
-  EXPECT_NE(said().find("You typed \"45\"; this run needs 90 degrees."), std::string::npos);
-  EXPECT_NE(said().find("You typed \"ninety\"; this run needs 90 degrees."), std::string::npos);
+  EXPECT_THAT(said(), AllOf(HasSubstr("You typed \"45\"; this run needs 90 degrees."),
+                            HasSubstr("You typed \"ninety\"; this run needs 90 degrees.")));
 }
 
-TEST_F(Prompt, TakesQAsNo) {
-  answer("q\n");
+class Unmounted : public Prompt, public testing::WithParamInterface<const char*> {};
+
+TEST_P(Unmounted, IsWhatQAndTheEndOfTheInputMean) {
+  answer(GetParam());
   EXPECT_THROW(mount(90), NotMounted);
+  EXPECT_EQ(record_.back(), std::string("operator_answered: ") + (*GetParam() == 'q' ? "q" : "(no more input)"));
 }
 
-TEST_F(Prompt, TakesEndOfFileAsNo) {
-  answer("9");
-  EXPECT_THROW(mount(90), NotMounted);
-}
-
-TEST_F(Prompt, DictatesThatTheInputEnded) {
-  answer("");
-  EXPECT_THROW(mount(90), NotMounted);
-  EXPECT_EQ(record_.back(), "operator_answered: (no more input)");
-}
+INSTANTIATE_TEST_SUITE_P(Prompt, Unmounted, testing::Values("q\n", "9", ""));
 
 TEST_F(Prompt, StopsWhenASignalCame) {
   stop_ = true;
@@ -102,15 +84,14 @@ TEST_F(Prompt, StopsWhenASignalCame) {
 TEST_F(Prompt, RunsAgainWhenThePersonJustPressesEnter) {
   answer("\n");
   EXPECT_TRUE(run_again());
-  EXPECT_NE(said().find("90°: repetition 2 is 3 % off. All runs are kept, whatever you answer."), std::string::npos)
-      << said();
-  EXPECT_NE(said().find("Run 90° again (extra run 1 of 2)?"), std::string::npos);
+  EXPECT_THAT(said(), AllOf(HasSubstr("90°: repetition 2 is 3 % off. All runs are kept, whatever you answer."),
+                            HasSubstr("Run 90° again (extra run 1 of 2)?")));
 }
 
 TEST_F(Prompt, TakesYesAndNoAndAsksAgainOtherwise) {
   answer("maybe\nn\n");
   EXPECT_FALSE(run_again());
-  EXPECT_NE(said().find("You typed \"maybe\"; type y, n or q."), std::string::npos) << said();
+  EXPECT_THAT(said(), HasSubstr("You typed \"maybe\"; type y, n or q."));
 }
 
 TEST_F(Prompt, StopsTheCampaignOnQInsteadOfAnotherRun) {
@@ -121,9 +102,9 @@ TEST_F(Prompt, StopsTheCampaignOnQInsteadOfAnotherRun) {
 TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
   answer("45\n90\n");
   mount(90);
-  EXPECT_THAT(record_,
-              testing::ElementsAre(
-                  "operator_asked: The supply's output is off.\nMount the 90° occlusion under propeller 5x3 (Test 5 "
+  EXPECT_THAT(
+      record_,
+      ElementsAre("operator_asked: The supply's output is off.\nMount the 90° occlusion under propeller 5x3 (Test 5 "
                   "inch). Step back. Type the mounted angle in degrees (90) and press Enter, or q to stop:",
                   "operator_answered: 45",
                   "operator_asked: Type the mounted angle in degrees (90) and press Enter, or q to stop:",
@@ -136,7 +117,7 @@ TEST_F(Prompt, EndsAsSoonAsTheGuardThatLivesThroughItTrips) {
   asked.while_waiting([&] {
     if (++looks == 3) throw SafetyStop("motor: the rotor turns at 100 RPM while somebody may be near");
   });
-  EXPECT_THROW((void)asked.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 90), SafetyStop) << "nobody types";
+  EXPECT_THROW((void)asked.confirm_mounting(kPropeller, 90), SafetyStop) << "nobody types";
 }
 
 TEST_F(Prompt, ContinuesAfterASafetyStopOnlyByAPersonsWord) {
@@ -155,14 +136,16 @@ TEST(AutoConfirmOperator, ClearsNoSafetyStopOfALiveBench) {
   AutoConfirmOperator(true).clear_safety_stop("thrust");
 }
 
+double ask(Operator& person, double occlusion_deg) {
+  return person.confirm_mounting(kPropeller, occlusion_deg).occlusion_deg();
+}
+
 TEST(AutoConfirmOperator, AgreesToEachMountingAndToOneMoreRun) {
   AutoConfirmOperator person;
-  EXPECT_EQ(person.confirm_mounting({"5x3", "Test 5 inch", 5, 3}, 45).occlusion_deg(), 45);
+  EXPECT_EQ(ask(person, 45), 45);
   EXPECT_TRUE(person.run_again({90, "", 1, 3}));
   EXPECT_FALSE(person.run_again({90, "", 2, 3}));
 }
-
-const profiles::Propeller kPropeller{"5x3", "Test 5 inch", 5, 3};
 
 AnsweringOperator answering(const std::string& lists) {
   return AnsweringOperator(profiles::parse_answers("format: kphi-answers/1\n" + lists, "a.yaml"));
@@ -170,20 +153,15 @@ AnsweringOperator answering(const std::string& lists) {
 
 template <class Ask>
 std::string refused(Ask ask) {
-  try {
-    ask();
-  } catch (const ConfigurationError& error) {
-    return error.what();
-  }
-  return {};
+  return test::words_of<ConfigurationError>(ask);
 }
 
 AnotherRun question(bool mounted_anew = false) { return {45, "repetition 2 is off", 1, 2, mounted_anew}; }
 
 TEST(AnsweringOperator, GivesItsAnswersInOrder) {
   auto person = answering("mountings: [0, 45]\nrun_again: [true, false]\n");
-  EXPECT_EQ(person.confirm_mounting(kPropeller, 0).occlusion_deg(), 0);
-  EXPECT_EQ(person.confirm_mounting(kPropeller, 45).occlusion_deg(), 45);
+  EXPECT_EQ(ask(person, 0), 0);
+  EXPECT_EQ(ask(person, 45), 45);
   EXPECT_TRUE(person.run_again(question()));
   EXPECT_FALSE(person.run_again(question()));
   EXPECT_EQ(refused([&] { person.finish(); }), "");
@@ -192,15 +170,15 @@ TEST(AnsweringOperator, GivesItsAnswersInOrder) {
 
 TEST(AnsweringOperator, LeavesTheMotorLockedAfterAWrongAnswer) {
   auto person = answering("mountings: [0, 45]\n");
-  (void)person.confirm_mounting(kPropeller, 0);
-  EXPECT_EQ(refused([&] { (void)person.confirm_mounting(kPropeller, 90); }),
+  ask(person, 0);
+  EXPECT_EQ(refused([&] { ask(person, 90); }),
             "a.yaml:2:16: mounting 2 is 45°, the campaign needs 90°; the motor stays locked");
 }
 
 TEST(AnsweringOperator, RefusesWhatItHasNoAnswerTo) {
   auto person = answering("mountings: [0]\nrun_again: [true]\n");
-  (void)person.confirm_mounting(kPropeller, 0);
-  EXPECT_EQ(refused([&] { (void)person.confirm_mounting(kPropeller, 45); }),
+  ask(person, 0);
+  EXPECT_EQ(refused([&] { ask(person, 45); }),
             "a.yaml:2:13: mountings has no answer 2: the campaign needs 45°; add it");
   EXPECT_TRUE(person.run_again(question()));
   EXPECT_THAT(refused([&] { (void)person.run_again(question()); }),
@@ -209,27 +187,27 @@ TEST(AnsweringOperator, RefusesWhatItHasNoAnswerTo) {
 
 TEST(AnsweringOperator, NamesWhatIsLeftOver) {
   auto person = answering("mountings: [0, 45]\nrun_again: [true]\n");
-  (void)person.confirm_mounting(kPropeller, 0);
+  ask(person, 0);
   EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:2:16: mounting 2 is one too many"));
-  (void)person.confirm_mounting(kPropeller, 45);
+  ask(person, 45);
   EXPECT_THAT(refused([&] { person.finish(); }), HasSubstr("a.yaml:3:13: answer 1 of run_again is one too many"));
 }
 
 TEST(AnsweringOperator, ConfirmsTheMountingOfAnotherRunWithTheAnswerToRunIt) {
   auto person = answering("mountings: [45]\nrun_again: [true]\n");
-  (void)person.confirm_mounting(kPropeller, 45);
+  ask(person, 45);
   EXPECT_TRUE(person.run_again(question(true)));
-  EXPECT_EQ(person.confirm_mounting(kPropeller, 45).occlusion_deg(), 45);
-  EXPECT_NE(refused([&] { (void)person.confirm_mounting(kPropeller, 45); }), "") << "once";
+  EXPECT_EQ(ask(person, 45), 45);
+  EXPECT_NE(refused([&] { ask(person, 45); }), "") << "once";
 }
 
 TEST(AnsweringOperator, DictatesEachQuestionAndAnswer) {
   auto person = answering("mountings: [0, 45]\nrun_again: [true]\n");
   std::vector<std::string> record;
   person.log_to([&](const char* event, const std::string& words) { record.push_back(event + (": " + words)); });
-  (void)person.confirm_mounting(kPropeller, 0);
+  ask(person, 0);
   (void)person.run_again(question());
-  EXPECT_NE(refused([&] { (void)person.confirm_mounting(kPropeller, 90); }), "");
+  EXPECT_NE(refused([&] { ask(person, 90); }), "");
   EXPECT_THAT(record, ElementsAre("operator_asked: mounted angle for propeller 5x3, 0°?", "operator_answered: 0",
                                   "operator_asked: run 45° again? repetition 2 is off", "operator_answered: true",
                                   "operator_asked: mounted angle for propeller 5x3, 90°?", "operator_answered: 45"));

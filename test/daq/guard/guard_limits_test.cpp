@@ -1,7 +1,6 @@
 #include "daq/guard/guard_limits.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <regex>
@@ -73,11 +72,9 @@ TEST_F(CombinedLimits, AreThoseOfTheCampaignWhenNobodySaysLess) {
 }
 
 TEST_F(CombinedLimits, HaveNoRowForWhatNobodyLimits) {
-  EXPECT_FALSE(row(Watched::shaft_torque));
-  EXPECT_FALSE(row(Watched::force_z));
-  EXPECT_FALSE(row(Watched::supply_voltage_high));
-  EXPECT_FALSE(row(Watched::supply_age)) << "there is no supply";
-  EXPECT_FALSE(row(Watched::output_current)) << "there is no supply";
+  for (const Watched watched : {Watched::shaft_torque, Watched::force_z, Watched::supply_voltage_high,
+                                Watched::supply_age, Watched::output_current})  // there is no supply
+    EXPECT_FALSE(row(watched)) << static_cast<int>(watched);
 }
 
 TEST_F(CombinedLimits, TakeTheTighterOfCampaignAndBench) {

@@ -26,7 +26,7 @@ void run_clean(double first_rpm, double last_rpm, bool supply) {
   bench.mounted("5x3", 0);
   Progress progress;
   const RunResult result =
-      record_run(bench, test::first_run(campaign, config, folder.path() / "run.h5"), progress, [] { return false; });
+      record_run(bench, test::first_run(campaign, config, folder.path() / "run.h5"), progress, test::never);
   EXPECT_EQ(result.account.lost_network + result.account.lost_host, 0u);
   EXPECT_GT(bench.clock().now(), std::chrono::minutes(30));
 }

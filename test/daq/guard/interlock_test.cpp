@@ -10,25 +10,14 @@
 namespace kphi::daq {
 namespace interlock_test {
 
-const GuardLimit kThrust{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"};
-
 TEST(Trip, SaysValueLimitAndSource) {
-  const Trip trip = passed(kThrust, 21.3);
-  EXPECT_EQ(trip.reason, "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)");
-  EXPECT_EQ(trip.watched, Watched::thrust);
-}
-
-TEST(Trip, SaysRevolutionsAsPeopleReadThem) {
+  const GuardLimit thrust{Watched::thrust, "thrust", 20, "N", "campaign limits.thrust_max_n"};
+  EXPECT_EQ(passed(thrust, 21.3).reason, "thrust 21.3 N is above 20 N (campaign limits.thrust_max_n)");
+  EXPECT_EQ(passed(thrust, 21.3).watched, Watched::thrust);
   const GuardLimit speed{Watched::speed, "speed", 20055, "RPM", "campaign"};
-  EXPECT_EQ(passed(speed, 20500.4).reason, "speed 20500 RPM is above 20055 RPM (campaign)");
-}
-
-TEST(Trip, SaysWhichLimitIsALowerOne) {
+  EXPECT_EQ(passed(speed, 20500.4).reason, "speed 20500 RPM is above 20055 RPM (campaign)") << "as people read them";
   const GuardLimit low{Watched::supply_voltage_low, "supply voltage", 5, "V", "device", true};
   EXPECT_EQ(passed(low, 4.2).reason, "supply voltage 4.2 V is below 5 V (device)");
-}
-
-TEST(Trip, SaysHowMuchOfItsRangeTheCellCarries) {
   const GuardLimit range{Watched::torque_y, "Ty", kRangeBorne * 1.0, "N m", "device"};
   EXPECT_EQ(passed(range, 1.15).reason, "load cell: Ty carries 115 % of its range of 1 N m");
 }
@@ -63,14 +52,12 @@ SupplyReading healthy() {
   return {1, 0, 11.9, 18, 12, 20, SupplyRegulation::constant_voltage, SupplyProtection::none, 1};
 }
 
-TEST(SupplyInterlock, LetsAHealthySupplyBe) { EXPECT_FALSE(check(healthy(), kWanted, true)); }
-
-TEST(SupplyInterlock, AllowsASagOfFivePercentAndARiseOfThree) {
+TEST(SupplyInterlock, LetsAHealthySupplyBeWithASagOfFivePercentAndARiseOfThree) {
   SupplyReading seen = healthy();
-  seen.voltage_v = 11.41;
-  EXPECT_FALSE(check(seen, kWanted, true));
-  seen.voltage_v = 12.35;
-  EXPECT_FALSE(check(seen, kWanted, true));
+  for (const double volts : {seen.voltage_v, 11.41, 12.35}) {
+    seen.voltage_v = volts;
+    EXPECT_FALSE(check(seen, kWanted, true)) << volts;
+  }
 }
 
 TEST(SupplyInterlock, ExcusesWhatAChangeOfSpeedBringsAndNothingElse) {

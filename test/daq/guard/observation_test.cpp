@@ -1,9 +1,7 @@
 #include "daq/guard/observation.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include <cmath>
 #include <set>
 #include <string>
 
@@ -24,9 +22,7 @@ class Observed : public testing::Test {
  protected:
   void samples(double fz_n, int n, double tz_nm = 0) {
     for (int i = 0; i < n; ++i) {
-      LoadCellRecord record;
-      record.counts[2] = static_cast<std::int32_t>(1e6 * fz_n);
-      record.counts[5] = static_cast<std::int32_t>(1e6 * tz_nm);
+      LoadCellRecord record = load_of(fz_n, tz_nm);
       record.arrival_ns = now_.count();
       observer_.take(record);
     }

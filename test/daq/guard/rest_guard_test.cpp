@@ -1,9 +1,9 @@
 #include "daq/guard/rest_guard.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "daq/guard/run_stopped.hpp"
+#include "test/daq/bench_fixture.hpp"
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
@@ -30,22 +30,16 @@ class RestingBench final : public QueueBench {
   std::function<void()> work;
 };
 
-std::string reason_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const SafetyStop& stop) {
-    return stop.what();
-  }
-  return "";
+template <class Call>
+std::string reason_of(Call&& act) {
+  return test::words_of<SafetyStop>(act);
 }
-
-const auto kNoStop = [] { return false; };
 
 TEST(RestGuard, WaitsUntilARotorThatCoastsIsSeenAtRest) {
   RestingBench bench;
   bench.speed = [&] { return 340 - 100 * bench.seconds(); };
   RestGuard guard(bench, true);
-  guard.await_rest(kNoStop);
+  guard.await_rest(test::never);
   EXPECT_NEAR(bench.seconds(), 3.36, 0.03);
   EXPECT_EQ(bench.queue_motor.coasted, 0);
 }
@@ -55,21 +49,18 @@ TEST(RestGuard, BelievesNoReadingFromBefore) {
   for (int i = 0; i < 10; ++i) bench.show(MotorChannel::speed, 0);
   bench.time.advance(std::chrono::seconds(1));
   bench.speed = [&] { return bench.seconds() < 3 ? 341.0 : 0.0; };
-  RestGuard(bench, true).await_rest(kNoStop);
+  RestGuard(bench, true).await_rest(test::never);
   EXPECT_GE(bench.seconds(), 3);
 }
 
-TEST(RestGuard, AsksNobodyToComeNearARotorThatDoesNotComeToRest) {
-  RestingBench bench;
-  bench.speed = [] { return 341.0; };
-  RestGuard guard(bench, true);
-  EXPECT_THAT(reason_of([&] { guard.await_rest(kNoStop); }), HasSubstr("still turning at 3256 RPM after 30 s"));
-}
-
-TEST(RestGuard, AsksNobodyToComeNearARotorThatNobodySees) {
-  RestingBench bench;
-  RestGuard guard(bench, true);
-  EXPECT_THAT(reason_of([&] { guard.await_rest(kNoStop); }), HasSubstr("it may be turning"));
+TEST(RestGuard, AsksNobodyToComeNearARotorThatDoesNotComeToRestOrThatNobodySees) {
+  RestingBench turning, unseen;
+  turning.speed = [] { return 341.0; };
+  for (const auto& [bench, words] :
+       {std::pair(&turning, "still turning at 3256 RPM after 30 s"), std::pair(&unseen, "it may be turning")}) {
+    RestGuard guard(*bench, true);
+    EXPECT_THAT(reason_of([&] { guard.await_rest(test::never); }), HasSubstr(words));
+  }
 }
 
 TEST(RestGuard, HearsThatSomebodyWantsToStop) {
@@ -86,13 +77,16 @@ class AtAPrompt : public testing::Test {
     bench_.speed = [this] { return speed_; };
     bench_.supply_link = &supply_;
     guard_.emplace(bench_, true);
-    guard_->await_rest(kNoStop);
+    guard_->await_rest(test::never);
   }
   void pass() { bench_.wait_until(bench_.time.now() + std::chrono::milliseconds(20)); }
   std::string reason() {
     return reason_of([&] { guard_->check(); });
   }
-  void expect_safe() {
+  /// Next.
+  void expect_trip(const std::string& words) {
+    pass();
+    EXPECT_THAT(reason(), HasSubstr(words));
     EXPECT_EQ(bench_.queue_motor.coasted, 1);
     EXPECT_EQ(supply_.cuts, 1);
   }
@@ -110,30 +104,22 @@ TEST_F(AtAPrompt, NothingTripsWhileTheRotorIsAtRest) {
 
 TEST_F(AtAPrompt, ATurningRotorTrips) {
   speed_ = -20;
-  pass();
-  EXPECT_THAT(reason(), HasSubstr("turning at 191 RPM while somebody may be near"));
-  expect_safe();
+  expect_trip("turning at 191 RPM while somebody may be near");
 }
 
 TEST_F(AtAPrompt, ASpeedThatIsNoNumberTrips) {
   speed_ = std::nan("");
-  pass();
-  EXPECT_NE(reason(), "");
-  expect_safe();
+  expect_trip("turning");
 }
 
 TEST_F(AtAPrompt, AModuleThatDrivesTrips) {
   bench_.show(MotorChannel::drive_mode, 3);
-  pass();
-  EXPECT_THAT(reason(), HasSubstr("does not coast"));
-  expect_safe();
+  expect_trip("does not coast");
 }
 
 TEST_F(AtAPrompt, ASleepOfTheComputerTrips) {
   bench_.time.suspend(std::chrono::seconds(5));
-  pass();
-  EXPECT_THAT(reason(), HasSubstr("this computer slept for 5 s"));
-  expect_safe();
+  expect_trip("this computer slept for 5 s");
 }
 
 TEST_F(AtAPrompt, AModuleWhosePowerAPersonHasCutIsNoTrip) {
@@ -153,9 +139,7 @@ TEST_F(AtAPrompt, AnOutputThatComesOnUnaskedTripsButNoReadingFromBefore) {
   EXPECT_EQ(reason(), "");
   on.time_ns = bench_.time.now().count() + 1;
   supply_.readings.push_back(on);
-  pass();
-  EXPECT_THAT(reason(), HasSubstr("output is on while somebody may be near"));
-  expect_safe();
+  expect_trip("output is on while somebody may be near");
 }
 
 }  // namespace rest_guard_test

@@ -1,7 +1,6 @@
 #include "daq/guard/speed_error.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
@@ -26,7 +25,7 @@ constexpr int kBenchSeconds = 120;
 /// A watch, told and shown a speed every 20 ms.
 class Watched {
  public:
-  explicit Watched(int direction = +1) : watch(direction, kHost) {}
+  explicit Watched(int way = +1) : direction(way), watch(way, kHost) {}
 
   void command(double speed) { watch.command(now, RadPerSec(speed)); }
   void show(double signed_speed) {
@@ -47,22 +46,33 @@ class Watched {
     return -1;
   }
   [[nodiscard]] Kind kind() const { return watch.error().kind; }
+  void expect_innocent() const { EXPECT_EQ(kind(), Kind::none) << to_words(watch.error()); }
+  /// Soon enough, `later` after what a rotor that turns is allowed.
+  void expect_guilt(double signed_speed, double later = 0) {
+    const double ms = ms_until_found(signed_speed);
+    EXPECT_GT(ms, 0) << signed_speed;
+    EXPECT_LE(ms, 140 + later) << signed_speed;
+  }
+  /// For long.
+  void follow(double speed, int times = 100) {
+    command(speed);
+    show(direction * speed, times);
+  }
 
   Instant now = std::chrono::seconds(5);
+  const int direction;
   SpeedWatch watch;
 };
 
 TEST(SpeedWatch, LetsARotorBeAnywhereOnARampButNotBesideIt) {
   for (const auto& [from, to] : {std::pair(300.0, 1800.0), std::pair(1800.0, 300.0)}) {
     Watched rotor;
-    rotor.command(from);
-    rotor.show(from, 200);
+    rotor.follow(from, 200);
     rotor.watch.command_ramp(rotor.now, RadPerSec(to));
     for (int i = 0; i <= 1000; ++i) rotor.show(from + (to - from) * i / 1000);  // 20 s: slower than any rotor
     EXPECT_EQ(rotor.kind(), Kind::none) << from;
-    rotor.command(to);
-    rotor.show(to, 100);
-    EXPECT_EQ(rotor.kind(), Kind::none);
+    rotor.follow(to);
+    rotor.expect_innocent();
     rotor.watch.command_ramp(rotor.now, RadPerSec(from));
     EXPECT_GT(rotor.ms_until_found(1800 * 1.3), 0) << "a runaway is one on a ramp, too";
   }
@@ -82,7 +92,7 @@ TEST(SpeedWatch, FindsNothingInARotorThatFollowsFortyStepsUpAndDown) {
         rotor.show(direction * (speed + noise(random)));
       }
     }
-    EXPECT_EQ(rotor.kind(), Kind::none) << to_words(rotor.watch.error());
+    rotor.expect_innocent();
   }
 }
 
@@ -90,10 +100,10 @@ TEST(SpeedWatch, WaitsForTheSlowestRotorThatIsAtWork) {
   Watched rotor;
   rotor.command(kTop);
   for (double speed = 0; speed < kTop; speed += SpeedWatch::kSlowestRise * to_seconds(kEvery)) rotor.show(speed);
-  EXPECT_EQ(rotor.kind(), Kind::none) << to_words(rotor.watch.error());
+  rotor.expect_innocent();
   rotor.command(500);
   for (double speed = kTop; speed > 500; speed -= SpeedWatch::kSlowestFall * to_seconds(kEvery)) rotor.show(speed);
-  EXPECT_EQ(rotor.kind(), Kind::none) << to_words(rotor.watch.error());
+  rotor.expect_innocent();
 }
 
 TEST(SpeedWatch, ForgetsNoSpeedThatTheRotorMayHaveWhenCommandsFollowSoonUponEachOther) {
@@ -102,14 +112,13 @@ TEST(SpeedWatch, ForgetsNoSpeedThatTheRotorMayHaveWhenCommandsFollowSoonUponEach
   rotor.show(1500, 5);
   rotor.command(500);
   rotor.show(1400, 25);  // a slow rotor would never have been so fast
-  EXPECT_EQ(rotor.kind(), Kind::none) << to_words(rotor.watch.error());
+  rotor.expect_innocent();
 }
 
 TEST(SpeedWatch, FindsAHeldRotorWithin140MillisecondsAtEverySpeedFrom30RadPerSecOn) {
   for (double speed = 30; speed <= kTop; speed += 10) {
     Watched rotor;
-    rotor.command(speed);
-    rotor.show(speed, 200);
+    rotor.follow(speed, 200);
     const double ms = rotor.ms_until_found(0);
     EXPECT_GT(ms, 100) << speed;
     EXPECT_LE(ms, 140) << speed;
@@ -119,78 +128,55 @@ TEST(SpeedWatch, FindsAHeldRotorWithin140MillisecondsAtEverySpeedFrom30RadPerSec
 
 TEST(SpeedWatch, FindsARotorThatIsHeldInTheMiddleOfAStep) {
   Watched rotor;
-  rotor.command(1000);
-  rotor.show(1000, 200);
+  rotor.follow(1000, 200);
   rotor.command(1051);
   rotor.show(1030);
-  const double ms = rotor.ms_until_found(0);
-  EXPECT_GT(ms, 0);
-  EXPECT_LE(ms, 140);
+  rotor.expect_guilt(0);
 }
 
 TEST(SpeedWatch, FindsARotorThatNeverStarts) {
   Watched rotor;
   rotor.command(1000);
-  const double ms = rotor.ms_until_found(0);
-  EXPECT_GT(ms, 0);
-  EXPECT_LE(ms, 140 + 1e3 * (SpeedWatch::kFloor + SpeedWatch::kShare * 1000) / SpeedWatch::kSlowestRise);
+  rotor.expect_guilt(0, 1e3 * (SpeedWatch::kFloor + SpeedWatch::kShare * 1000) / SpeedWatch::kSlowestRise);
 }
 
 TEST(SpeedWatch, FindsWhatRunsAwaySlipsTurnsTheWrongWayOrIsNoNumber) {
   for (const double speed : {1200.0, 800.0, -1000.0, std::numeric_limits<double>::quiet_NaN()}) {
     Watched rotor;
-    rotor.command(1000);
-    rotor.show(1000, 100);
-    const double ms = rotor.ms_until_found(speed);
-    EXPECT_GT(ms, 0) << speed;
-    EXPECT_LE(ms, 140) << speed;
+    rotor.follow(1000);
+    rotor.expect_guilt(speed);
   }
   Watched clockwise(-1);
-  clockwise.command(1000);
-  clockwise.show(-1000, 100);
-  EXPECT_EQ(clockwise.kind(), Kind::none);
+  clockwise.follow(1000);
+  clockwise.expect_innocent();
   EXPECT_GT(clockwise.ms_until_found(+1000), 0);
 }
 
-TEST(SpeedWatch, ForgivesWhatIsOverSooner) {
+TEST(SpeedWatch, ForgivesWhatIsOverSoonerAndLeavesALittleTooSlowToTheJudgeOfTheMeasurement) {
   Watched rotor;
-  rotor.command(1000);
-  rotor.show(1000, 100);
+  rotor.follow(1000);
   for (int i = 0; i < 20; ++i) {
     rotor.show(0, 5);
     rotor.show(1000);
   }
-  EXPECT_EQ(rotor.kind(), Kind::none);
-}
-
-TEST(SpeedWatch, LeavesALittleTooSlowToTheJudgeOfTheMeasurement) {
-  Watched rotor;
-  rotor.command(1000);
-  rotor.show(1000, 100);
+  rotor.expect_innocent();
   rotor.show(0.9 * 1000, 100);
-  EXPECT_EQ(rotor.kind(), Kind::none);
+  rotor.expect_innocent();
 }
 
-TEST(SpeedWatch, FindsAStalledMotorByItsCurrentWhereTheSpeedTellsNothing) {
-  Watched rotor;
-  rotor.command(10.5);  // 100 RPM
-  rotor.show(0, 8);
-  rotor.show_current(29);
-  EXPECT_EQ(rotor.kind(), Kind::none) << "one reading is none";
-  rotor.show(0, 8);
-  rotor.show_current(30);
-  ASSERT_EQ(rotor.kind(), Kind::stalled);
-  EXPECT_THAT(to_words(rotor.watch.error()), HasSubstr("stalled for 0.16 s: 30 A at 0 of 100 RPM"));
-}
-
-TEST(SpeedWatch, FindsAStalledMotorWhicheverWayItsCurrentFlows) {
-  Watched rotor(-1);
-  rotor.command(10.5);
-  for (int i = 0; i < 2; ++i) {
+TEST(SpeedWatch, FindsAStalledMotorByItsCurrentWhicheverWayItFlowsWhereTheSpeedTellsNothing) {
+  for (const int direction : {+1, -1}) {
+    Watched rotor(direction);
+    rotor.command(10.5);  // 100 RPM
     rotor.show(0, 8);
-    rotor.show_current(-30);
+    rotor.show_current(direction * 29);
+    EXPECT_EQ(rotor.kind(), Kind::none) << "one reading is none";
+    rotor.show(0, 8);
+    rotor.show_current(direction * 30);
+    ASSERT_EQ(rotor.kind(), Kind::stalled);
+    EXPECT_THAT(to_words(rotor.watch.error()), HasSubstr(direction > 0 ? "stalled for 0.16 s: 30 A at 0 of 100 RPM"
+                                                                       : "stalled for 0.16 s: -30 A at -0 of 100 RPM"));
   }
-  EXPECT_EQ(rotor.kind(), Kind::stalled);
 }
 
 TEST(SpeedWatch, AllowsTheCurrentOfARotorThatTurns) {
@@ -201,13 +187,12 @@ TEST(SpeedWatch, AllowsTheCurrentOfARotorThatTurns) {
     rotor.show(speed = std::min(kTop, speed + 100));
     rotor.show_current(30);
   }
-  EXPECT_EQ(rotor.kind(), Kind::none);
+  rotor.expect_innocent();
 }
 
 TEST(SpeedWatch, FindsThatTheSpeedIsNoLongerReadThoughTheModuleAnswers) {
   Watched rotor;
-  rotor.command(1000);
-  rotor.show(1000, 100);
+  rotor.follow(1000);
   const Instant last = rotor.now;
   while (rotor.kind() == Kind::none && rotor.now < last + milliseconds(1000)) {
     rotor.now += kEvery;
@@ -221,13 +206,13 @@ TEST(SpeedWatch, FindsThatTheSpeedIsNoLongerReadThoughTheModuleAnswers) {
 TEST(SpeedWatch, JudgesNothingWhileNobodyCommandsASpeed) {
   Watched rotor;
   rotor.show(1000, 100);
-  EXPECT_EQ(rotor.kind(), Kind::none);
+  rotor.expect_innocent();
   rotor.command(1000);
   EXPECT_GT(rotor.ms_until_found(0), 0);
   rotor.watch.release();
-  EXPECT_EQ(rotor.kind(), Kind::none);
+  rotor.expect_innocent();
   rotor.show(1000, 100);
-  EXPECT_EQ(rotor.kind(), Kind::none);
+  rotor.expect_innocent();
 }
 
 struct Clean {

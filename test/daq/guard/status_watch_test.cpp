@@ -1,7 +1,6 @@
 #include "daq/guard/status_watch.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace kphi::daq {
 namespace status_watch_test {
@@ -15,14 +14,15 @@ constexpr std::uint32_t kSerialLink = 0x88000000;  // of an Axia: a gage is out 
 /// A box of 40 samples per datagram at 7 kHz.
 class StatusWatching : public testing::Test {
  protected:
-  State take(std::uint32_t status, int n = 1, StatusWatch* watch = nullptr) {
+  State take(std::uint32_t status, int n = 1) { return take(watch_, status, n); }
+  State take(StatusWatch& watch, std::uint32_t status, int n) {
     State state = State::trusted;
     for (int i = 0; i < n; ++i) {
       LoadCellRecord sample;
       sample.status = status;
       sample.arrival_ns = now_ns_ += 142'857;
-      state = (watch != nullptr ? *watch : watch_).take(sample);
-      if (auto event = (watch != nullptr ? *watch : watch_).take_event()) events_.push_back(*event);
+      state = watch.take(sample);
+      if (auto event = watch.take_event()) events_.push_back(*event);
     }
     return state;
   }
@@ -63,25 +63,25 @@ TEST_F(StatusWatching, NamesAllThatIsSet) {
 
 TEST_F(StatusWatching, TrustsALatchedMonitorCondition) {
   EXPECT_EQ(take(0x80010000, 10'000), State::trusted);
-  EXPECT_EQ(take(0x80010000, 10'000, &axia_), State::trusted);
+  EXPECT_EQ(take(axia_, 0x80010000, 10'000), State::trusted);
   EXPECT_TRUE(events_.empty());
 }
 
 TEST_F(StatusWatching, ReadsTheBitsOfItsProduct) {
-  EXPECT_EQ(take(kSerialLink, 41, &axia_), State::trusted) << "an Axia's gage out of range is saturation";
+  EXPECT_EQ(take(axia_, kSerialLink, 41), State::trusted) << "an Axia's gage out of range is saturation";
   EXPECT_TRUE(events_.empty()) << "which the ranges tell";
   EXPECT_EQ(take(0xC0000000, 41), State::untrusted) << "a Net Box's CPU or RAM";
   StatusWatch other{Product::axia, 40, 7000};
-  EXPECT_EQ(take(0x80020000, 41, &other), State::untrusted) << "a Net Box's saturation is no bit of an Axia";
+  EXPECT_EQ(take(other, 0x80020000, 41), State::untrusted) << "a Net Box's saturation is no bit of an Axia";
   EXPECT_THAT(other.reason(), HasSubstr("the Axia reports \"bit 17\" (status 0x80020000)"));
 }
 
 TEST_F(StatusWatching, HasHalfASecondForWhatMayPass) {
   for (const std::uint32_t status : {0x80020000u, 0x80100000u, 0x80120000u}) {
     StatusWatch watch{Product::net_box, 40, 7000};
-    EXPECT_EQ(take(status, 3500, &watch), State::trusted);
-    EXPECT_EQ(take(status, 1, &watch), State::lasting);
-    EXPECT_EQ(take(0, 1, &watch), State::trusted);
+    EXPECT_EQ(take(watch, status, 3500), State::trusted);
+    EXPECT_EQ(take(watch, status, 1), State::lasting);
+    EXPECT_EQ(take(watch, 0, 1), State::trusted);
     EXPECT_THAT(watch.reason(), HasSubstr("for 500.3 ms, so its samples cannot be trusted; "));
   }
   EXPECT_TRUE(events_.empty()) << "ranges and stream tell of these";
@@ -95,11 +95,11 @@ TEST_F(StatusWatching, DoesNotRememberAnErrorThatLastedForLongerThanItsPatience)
 
 TEST_F(StatusWatching, HasAPatienceOfOneSampleAndOfOneSlowDatagramAtLeast) {
   StatusWatch single{Product::net_box, 1, 7000};
-  EXPECT_EQ(take(kSerialLink, 1, &single), State::trusted);
-  EXPECT_EQ(take(kSerialLink, 1, &single), State::untrusted);
+  EXPECT_EQ(take(single, kSerialLink, 1), State::trusted);
+  EXPECT_EQ(take(single, kSerialLink, 1), State::untrusted);
   StatusWatch slow{Product::net_box, 40, 10};
-  EXPECT_EQ(take(0x80020000, 40, &slow), State::trusted);
-  EXPECT_EQ(take(0x80020000, 1, &slow), State::lasting);
+  EXPECT_EQ(take(slow, 0x80020000, 40), State::trusted);
+  EXPECT_EQ(take(slow, 0x80020000, 1), State::lasting);
 }
 
 TEST_F(StatusWatching, TellsTheFirstErrorAndItsEndWithTheirTimes) {

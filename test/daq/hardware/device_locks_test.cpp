@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include "base/error.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::daq {
 namespace device_locks_test {
@@ -47,13 +47,11 @@ std::string own_name(const char* what) { return fmt::format("test {} {}", ::getp
 
 TEST(DeviceLocks, RefuseTheSecondAndSayWhoHasIt) {
   const auto first = lock_devices({own_name("a"), own_name("b")});
-  try {
-    const auto second = lock_devices({own_name("c"), own_name("b")});
-    FAIL();
-  } catch (const DeviceError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr(own_name("b")), HasSubstr(fmt::format("process {} (", ::getpid())),
-                                    HasSubstr("kill -INT")));
-  }
+  EXPECT_THAT(
+      refusal([] {
+        return lock_devices({own_name("c"), own_name("b")});
+      }),
+      AllOf(HasSubstr(own_name("b")), HasSubstr(fmt::format("process {} (", ::getpid())), HasSubstr("kill -INT")));
   EXPECT_NO_THROW((void)lock_devices({own_name("c")})) << "what the refused one had taken is free again";
 }
 

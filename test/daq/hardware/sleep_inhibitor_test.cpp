@@ -135,20 +135,14 @@ TEST_F(SleepInhibitorOnABus, IsTakenForEachRunAnew) {
   EXPECT_THAT(logind.inhibitors_once_they_are(0), IsEmpty());
 }
 
-TEST_F(SleepInhibitorOnABus, DoesWithoutTheLidWhereThatIsRefused) {
+TEST_F(SleepInhibitorOnABus, DoesWithoutTheLidOrTakesSleepAloneWhereTheOthersAreRefused) {
   const LogindMock logind(*bus_);
-  logind.refuse("lid");
-  const SleepInhibitor inhibitor;
-  EXPECT_EQ(inhibitor.why_not(), "");
-  EXPECT_THAT(logind.inhibitors(), ElementsAre(kphi_holds("sleep:idle")));
-}
-
-TEST_F(SleepInhibitorOnABus, TakesSleepAloneWhereCombinationsAreRefused) {
-  const LogindMock logind(*bus_);
-  logind.refuse(":");
-  const SleepInhibitor inhibitor;
-  EXPECT_EQ(inhibitor.why_not(), "");
-  EXPECT_THAT(logind.inhibitors(), ElementsAre(kphi_holds("sleep")));
+  for (const auto& [refused, held] : {std::pair("lid", "sleep:idle"), std::pair(":", "sleep")}) {
+    logind.refuse(refused);
+    const SleepInhibitor inhibitor;
+    EXPECT_EQ(inhibitor.why_not(), "");
+    EXPECT_THAT(logind.inhibitors_once_they_are(1), ElementsAre(kphi_holds(held)));
+  }
 }
 
 TEST_F(SleepInhibitorOnABus, SaysThatLogindRefused) {

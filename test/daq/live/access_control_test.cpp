@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <set>
 #include <string>
@@ -12,113 +13,64 @@
 namespace kphi::daq::live {
 namespace access_control_test {
 
-constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
-
-AccessRequest visit(std::string_view target = "/?token=0123456789abcdef0123456789abcdef") {
-  return {"GET", target, "127.0.0.1:8080", std::nullopt, false};
-}
-
-TEST(AccessControl, LetsInWhoKnowsTheToken) {
-  EXPECT_EQ(authorize(visit(), kToken).to, Access::page);
-  AccessRequest request = visit("/live?token=0123456789abcdef0123456789abcdef");
-  request.upgrade = true;
-  EXPECT_EQ(authorize(request, kToken).to, Access::live);
-}
-
-TEST(AccessControl, RefusesAWrongOrMissingToken) {
-  for (const char* target :
-       {"/", "/?", "/?token=", "/?token=0", "/?token=0123456789abcdef0123456789abcdee",
-        "/?Token="
-        "0123456789abcdef0123456789abcdef",
-        "/?a=b&token=0123456789abcdef0123456789abcdef", "/live", "/live?token=0123456789abcdef0123456789abcdef0",
-        "/live?token=0123456789abcdef0123456789abcdef&x=1"}) {
-    EXPECT_EQ(authorize(visit(target), kToken).to, Access::denied) << target;
-    EXPECT_EQ(authorize(visit(target), kToken).status, 403u) << target;
-  }
-}
-
-TEST(AccessControl, RefusesAForeignHostEvenWithTheToken) {
-  for (const char* host : {"evil.example", "evil.example:8080", "127.0.0.1.evil.example:8080", "localhost.evil.example",
-                           "192.168.1.5:8080", "", ":8080", "127.0.0.11"}) {
-    AccessRequest request = visit();
-    request.host = host;
-    EXPECT_EQ(authorize(request, kToken).status, 403u) << host;
-  }
-}
-
-TEST(AccessControl, RefusesAForeignOriginEvenWithTheToken) {
-  for (const char* origin :
-       {"http://evil.example", "https://127.0.0.1:8080", "file://127.0.0.1:8080", "http://127.0.0.1:3000", "null", "",
-        "http://127.0.0.1:8080.evil.example", "http://localhost:8080"}) {
-    AccessRequest request = visit();
-    request.origin = origin;
-    EXPECT_EQ(authorize(request, kToken).status, 403u) << origin;
-  }
-}
+constexpr std::string_view kToken = "0123456789abcdef0123456789abcdef";
+constexpr std::string_view kHost = "127.0.0.1:8080";
 
 TEST(AccessControl, AcceptsItsOwnPageAlsoThroughATunnel) {
   for (const char* host : {"127.0.0.1:8080", "localhost:8080", "localhost:9999", "localhost"}) {
-    const std::string origin = std::string("http://") + host;
-    AccessRequest request = visit();
-    request.host = host;
-    request.origin = origin;
-    EXPECT_EQ(authorize(request, kToken).to, Access::page) << host;
+    const std::string origin = std::string("http://") + host, target = "/?token=" + std::string(kToken);
+    EXPECT_EQ(authorize({"GET", target, host, origin, false}, kToken).to, Access::page) << host;
   }
 }
 
-TEST(AccessControl, KnowsTwoPathsAndOneMethod) {
-  EXPECT_EQ(authorize(visit("/stop?token=0123456789abcdef0123456789abcdef"), kToken).status, 404u);
-  EXPECT_EQ(authorize(visit("http://127.0.0.1/?token=0123456789abcdef0123456789abcdef"), kToken).status, 404u);
-  EXPECT_EQ(authorize(visit("/live?token=0123456789abcdef0123456789abcdef"), kToken).status, 426u);
-  for (const char* method : {"POST", "HEAD", "OPTIONS", "PUT", "get"}) {
-    AccessRequest request = visit();
-    request.method = method;
-    EXPECT_EQ(authorize(request, kToken).status, 405u) << method;
-  }
-}
-
-/// A right answer to each of the gate's questions, and wrong ones.
+/// What is right of one part of a request, and what is wrong with the status that says so.
 template <class T>
-struct Answers {
-  std::vector<T> right, wrong;
-  [[nodiscard]] std::vector<std::pair<T, bool>> all() const {
-    std::vector<std::pair<T, bool>> all;
-    for (const T& each : right) all.emplace_back(each, true);
-    for (const T& each : wrong) all.emplace_back(each, false);
-    return all;
-  }
-};
+using Answers = std::vector<std::pair<T, unsigned>>;
 
 TEST(AccessControl, RefusesEveryCombinationInWhichAnythingIsWrong) {
   using Text = std::string_view;
   using Origin = std::optional<std::string_view>;
-  constexpr Text kHost = "127.0.0.1:8080";
-  const Answers<Text> methods{{"GET"}, {"POST", ""}};
-  const Answers<Text> hosts{{kHost}, {"evil.example:8080", "127.0.0.1.evil.example", ""}};
-  const Answers<Origin> origins{{std::nullopt, Origin("http://127.0.0.1:8080")},
-                                {Origin("http://evil.example"), Origin("https://127.0.0.1:8080"),
-                                 Origin("file://127.0.0.1:8080"), Origin("null"), Origin("")}};
-  const Answers<std::pair<Text, bool>> paths{{{"/", false}, {"/", true}, {"/live", true}},
-                                             {{"/live", false}, {"/stop", true}, {"/live/", true}, {"//", false}}};
-  const Answers<Text> queries{{"?token=0123456789abcdef0123456789abcdef"},
-                              {"?token=1123456789abcdef0123456789abcdef", "?token=0123456789abcdef0123456789abcdee",
-                               "?token=0123456789abcdef", "?token=", "?", ""}};
-  int admitted = 0, refused = 0;
-  for (const auto& [method, method_is_right] : methods.all())
-    for (const auto& [host, host_is_right] : hosts.all())
-      for (const auto& [origin, origin_is_right] : origins.all())
-        for (const auto& [path, path_is_right] : paths.all())
-          for (const auto& [query, token_is_right] : queries.all()) {
+  const Answers<Text> methods{{"GET", 0},   {"POST", 405}, {"HEAD", 405}, {"OPTIONS", 405},
+                              {"PUT", 405}, {"get", 405},  {"", 405}};
+  Answers<Text> hosts{{kHost, 0}};
+  for (const char* host : {"evil.example", "evil.example:8080", "127.0.0.1.evil.example", "127.0.0.1.evil.example:8080",
+                           "localhost.evil.example", "192.168.1.5:8080", "", ":8080", "127.0.0.11"})
+    hosts.emplace_back(host, 403);
+  Answers<Origin> origins{{std::nullopt, 0}, {"http://127.0.0.1:8080", 0}};
+  for (const char* origin :
+       {"http://evil.example", "https://127.0.0.1:8080", "file://127.0.0.1:8080", "http://127.0.0.1:3000", "null", "",
+        "http://127.0.0.1:8080.evil.example", "http://localhost:8080"})
+    origins.emplace_back(origin, 403);
+  const Answers<std::pair<Text, bool>> paths{
+      {{"/", false}, 0},       {{"/", true}, 0},       {{"/live", true}, 0},
+      {{"/live", false}, 426}, {{"/stop", true}, 404}, {{"/stop", false}, 404},
+      {{"/live/", true}, 404}, {{"//", false}, 404},   {{"http://127.0.0.1/", false}, 404}};
+  Answers<Text> queries{{"?token=0123456789abcdef0123456789abcdef", 0}};
+  for (const char* query : {"?token=1123456789abcdef0123456789abcdef", "?token=0123456789abcdef0123456789abcdee",
+                            "?token=0123456789abcdef0123456789abcdef0", "?token=0123456789abcdef0123456789abcdef&x=1",
+                            "?Token=0123456789abcdef0123456789abcdef", "?a=b&token=0123456789abcdef0123456789abcdef",
+                            "?token=0123456789abcdef", "?token=0", "?token=", "?", ""})
+    queries.emplace_back(query, 403);
+  int admitted = 0;
+  for (const auto& [method, wrong_method] : methods)
+    for (const auto& [host, wrong_host] : hosts)
+      for (const auto& [origin, wrong_origin] : origins)
+        for (const auto& [path, wrong_path] : paths)
+          for (const auto& [query, wrong_token] : queries) {
             const std::string target = std::string(path.first) + std::string(query);
             const Answer answer = authorize({method, target, host, origin, path.second}, kToken);
-            const bool right = method_is_right && host_is_right && origin_is_right && path_is_right && token_is_right;
-            EXPECT_EQ(answer.to != Access::denied, right)
+            const auto wrong = {wrong_method, wrong_host, wrong_origin, wrong_path == 404 ? 404u : 0u,
+                                wrong_token,  wrong_path};
+            const auto first = std::find_if(wrong.begin(), wrong.end(), [](unsigned status) { return status > 0; });
+            const bool live = path.first == "/live";
+            ASSERT_EQ(answer.status, first != wrong.end() ? *first
+                                     : live               ? 101
+                                                          : 200)
                 << method << ' ' << target << " host " << host << " origin " << origin.value_or("(none)");
-            EXPECT_EQ(answer.status < 400, right);
-            ++(answer.to == Access::denied ? refused : admitted);
+            ASSERT_EQ(answer.to, first != wrong.end() ? Access::denied : live ? Access::live : Access::page);
+            admitted += answer.to != Access::denied;
           }
   EXPECT_EQ(admitted, 2 * 3) << "of each origin: the page twice, its WebSocket once";
-  EXPECT_EQ(refused, 3 * 4 * 7 * 7 * 7 - admitted);
 }
 
 TEST(AccessControl, DrawsAnotherTokenEveryTime) {

@@ -1,7 +1,6 @@
 #include "daq/live/live_session.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -57,13 +56,17 @@ class LiveProgressOf : public testing::Test {
   Observation seen_;
 };
 
-TEST_F(LiveProgressOf, TellsTheTerminalAllTheSame) {
+TEST_F(LiveProgressOf, TellsTheTerminalAllTheSameAndPassesOnWhatIsSaid) {
   hold(0, std::chrono::milliseconds(50), 1, 6000);
+  progress_.say("load cell: it is silent");
+  EXPECT_THAT(told_.lines, ElementsAre("load cell: it is silent"));
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0]["type"], "line");
+  EXPECT_EQ(told[0]["text"], "load cell: it is silent");
   progress_.step_done(position_, seen_);
-  progress_.say("well");
   EXPECT_EQ(told_.ticks, 5);
   EXPECT_EQ(told_.steps, 1);
-  EXPECT_THAT(told_.lines, testing::ElementsAre("well"));
 }
 
 TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
@@ -127,14 +130,6 @@ TEST_F(LiveProgressOf, CountsProgressFromTheLongestTimeLeft) {
   position_.remaining_s = 25;
   hold(0, std::chrono::milliseconds(10), 1, 6000);
   EXPECT_DOUBLE_EQ(feed_.newest().progress, 0.75);
-}
-
-TEST_F(LiveProgressOf, PassesOnWhatIsSaid) {
-  progress_.say("load cell: it is silent");
-  const std::vector<json> told = messages();
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_EQ(told[0]["type"], "line");
-  EXPECT_EQ(told[0]["text"], "load cell: it is silent");
 }
 
 TEST_F(LiveProgressOf, GivesThePlotterTheLimitsOfTheGuardAtWork) {

@@ -44,21 +44,13 @@ Tick full_tick() {
 
 TEST(LiveMessages, OfATickCarryEveryNumberWithItsUnitInTheKey) {
   const json tick = json::parse(tick_message(full_tick(), 0.01, 5));
-  EXPECT_EQ(tick["type"], "tick");
-  EXPECT_EQ(tick["thrust_n"], 1.1621);
-  EXPECT_EQ(tick["speed_rpm"], 7893.6);
-  EXPECT_EQ(tick["commanded_rpm"], 7895);
-  EXPECT_EQ(tick["module_v"], 11.9);
-  EXPECT_EQ(tick["module_a"], 3.2);
-  EXPECT_EQ(tick["supply_v"], 12);
-  EXPECT_EQ(tick["coil_degc"], 41);
-  EXPECT_EQ(tick["step"], 16);
-  EXPECT_EQ(tick["propeller"], "5x3");
-  EXPECT_EQ(tick["phase"], "") << "in a step";
+  const json told{{"type", "tick"},   {"thrust_n", 1.1621}, {"speed_rpm", 7893.6}, {"commanded_rpm", 7895},
+                  {"module_v", 11.9}, {"module_a", 3.2},    {"supply_v", 12},      {"coil_degc", 41},
+                  {"step", 16},       {"propeller", "5x3"}, {"dropped", 5},        {"phase", ""}};  // in a step
+  for (const auto& [key, value] : told.items()) EXPECT_EQ(tick[key], value) << key;
   EXPECT_EQ(tick["watched"].size(), kWatchedCount);
   EXPECT_EQ(tick["watched"]["thrust_n"], 1.162) << "four digits";
   EXPECT_TRUE(tick["watched"]["fx_n"].is_null());
-  EXPECT_EQ(tick["dropped"], 5);
 }
 
 TEST(LiveMessages, SayNullForWhatIsUnknown) {

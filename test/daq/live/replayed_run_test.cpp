@@ -1,7 +1,6 @@
 #include "daq/live/replayed_run.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "daq/live/live_session.hpp"
 #include "results/run_reader.hpp"

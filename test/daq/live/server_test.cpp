@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
@@ -37,7 +36,8 @@ using namespace std::chrono_literals;
 
 static_assert(Server::Settings{}.frame.count() > 0 && 20 * Server::Settings{}.frame <= 1s, "20 frames a second");
 
-constexpr const char* kToken = "0123456789abcdef0123456789abcdef";
+const std::string kToken = "0123456789abcdef0123456789abcdef";
+const std::string kPage = "/?token=" + kToken, kLive = "/live?token=" + kToken;
 
 /// A page's WebSocket, as a stranger's program would open it.
 class Onlooker {
@@ -63,6 +63,8 @@ class Onlooker {
     error_code ignored;
     stream_.write_some(false, asio::buffer(part), ignored);
   }
+  /// Has heard all that was before it came.
+  void catch_up() { (void)hear("history"); }
   /// The next message; discarded when the server has closed.
   json hear() {
     boost::beast::flat_buffer bytes;
@@ -96,20 +98,31 @@ class LiveServer : public testing::Test {
     server_ = std::make_unique<Server>(settings, feed_);
   }
   [[nodiscard]] std::string here() const { return fmt::format("127.0.0.1:{}", server_->port()); }
-  std::unique_ptr<Onlooker> onlooker(const std::string& token = kToken, int receive_buffer = 0) {
-    return std::make_unique<Onlooker>(server_->port(), "/live?token=" + token, here(), "http://" + here(),
-                                      receive_buffer);
+  std::unique_ptr<Onlooker> onlooker(int receive_buffer = 0) {
+    return std::make_unique<Onlooker>(server_->port(), kLive, here(), "http://" + here(), receive_buffer);
+  }
+  std::unique_ptr<Onlooker> caught_up() {
+    auto page = onlooker();
+    page->catch_up();
+    return page;
   }
   void show(double time_s) {
     Tick tick;
     tick.time_s = time_s;
     feed_.show(tick);
   }
+  void draw(double time_s) {
+    show(time_s);
+    server_->draw();
+  }
+  tcp::socket connected() {
+    tcp::socket socket(io_);
+    socket.connect({asio::ip::address_v4::loopback(), server_->port()});
+    return socket;
+  }
   /// Everything that is answered to these bytes.
   std::string answer_to(const std::string& bytes) {
-    asio::io_context io;
-    tcp::socket socket(io);
-    socket.connect({asio::ip::address_v4::loopback(), server_->port()});
+    tcp::socket socket = connected();
     error_code ignored;
     asio::write(socket, asio::buffer(bytes), ignored);
     std::string answer;
@@ -128,86 +141,73 @@ class LiveServer : public testing::Test {
     return answer.substr(0, answer.find('\r'));
   }
 
+  asio::io_context io_;
   Feed feed_;
   std::unique_ptr<Server> server_;
 };
 
-TEST_F(LiveServer, GivesThePageToWhoKnowsTheToken) {
+TEST_F(LiveServer, GivesThePageToWhoKnowsTheTokenAndLetsItLoadNothingAndRunOnlyItsOwnScripts) {
   start();
-  const std::string answer = get(std::string("/?token=") + kToken);
+  EXPECT_EQ(server_->url(), fmt::format("http://{}{}", here(), kPage));
+  const std::string answer = get(kPage), again = get(kPage);
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 200"));
-  EXPECT_THAT(answer, HasSubstr("</html>"));
-  EXPECT_EQ(server_->url(), fmt::format("http://{}/?token={}", here(), kToken));
-}
-
-TEST_F(LiveServer, LetsThePageLoadNothingAndRunOnlyItsOwnScripts) {
-  start();
-  const std::string target = std::string("/?token=") + kToken;
-  const std::string answer = get(target), again = get(target);
   const auto policy = [](const std::string& text) {
     const std::size_t at = text.find("Content-Security-Policy");
     return text.substr(at, text.find("\r\n", at) - at);
   };
   EXPECT_THAT(policy(answer), HasSubstr("default-src 'none'; script-src 'nonce-"));
   EXPECT_NE(policy(answer), policy(again)) << "a nonce is used once";
-  EXPECT_THAT(answer, Not(HasSubstr("@NONCE@")));
-  EXPECT_THAT(answer, HasSubstr("Referrer-Policy: no-referrer"));
+  EXPECT_THAT(answer,
+              AllOf(HasSubstr("</html>"), HasSubstr("Referrer-Policy: no-referrer"), Not(HasSubstr("@NONCE@"))));
 }
 
-TEST_F(LiveServer, RefusesAWrongOrMissingToken) {
+TEST_F(LiveServer, RefusesAWrongOrMissingTokenAndForeignOriginsAndHosts) {
   start();
+  const std::string wrong = "0123456789abcdef0123456789abcdee", own = "http://" + here();
   EXPECT_THAT(get("/"), StartsWith("HTTP/1.1 403"));
-  EXPECT_THAT(get("/?token=0123456789abcdef0123456789abcdee"), StartsWith("HTTP/1.1 403"));
-  EXPECT_EQ(refusal_of("", here(), "http://" + here()), "HTTP/1.1 403 Forbidden");
-  EXPECT_EQ(refusal_of("0123456789abcdef0123456789abcdee", here(), "http://" + here()), "HTTP/1.1 403 Forbidden");
-  EXPECT_EQ(server_->clients(), 0u);
-}
-
-TEST_F(LiveServer, RefusesForeignOriginsAndHosts) {
-  start();
+  EXPECT_THAT(get("/?token=" + wrong), StartsWith("HTTP/1.1 403"));
   const std::string foreign = fmt::format("evil.example:{}", server_->port());
-  EXPECT_EQ(refusal_of(kToken, here(), "http://evil.example"), "HTTP/1.1 403 Forbidden");
-  EXPECT_EQ(refusal_of(kToken, here(), "null"), "HTTP/1.1 403 Forbidden");
-  EXPECT_EQ(refusal_of(kToken, foreign, "http://" + foreign), "HTTP/1.1 403 Forbidden") << "DNS rebinding";
-  const std::string live = std::string("/live?token=") + kToken;
-  EXPECT_FALSE(Onlooker(server_->port(), live, here(), "http://evil.example").is_in());
-  EXPECT_TRUE(Onlooker(server_->port(), live, here(), "").is_in()) << "a program that is no browser";
+  for (const auto& [token, host, origin] :
+       std::vector<std::array<std::string, 3>>{{"", here(), own},
+                                               {wrong, here(), own},
+                                               {kToken, here(), "http://evil.example"},
+                                               {kToken, here(), "null"},
+                                               {kToken, foreign, "http://" + foreign}})
+    EXPECT_EQ(refusal_of(token, host, origin), "HTTP/1.1 403 Forbidden") << host << " " << origin;
+  EXPECT_EQ(server_->clients(), 0u);
+  EXPECT_FALSE(Onlooker(server_->port(), kLive, here(), "http://evil.example").is_in());
+  EXPECT_TRUE(Onlooker(server_->port(), kLive, here(), "").is_in()) << "a program that is no browser";
 }
 
 TEST_F(LiveServer, RefusesWhatIsNoPlainGet) {
   start();
-  const std::string target = std::string("/?token=") + kToken;
-  EXPECT_THAT(answer_to(fmt::format("POST {} HTTP/1.1\r\nHost: {}\r\n\r\n", target, here())),
+  EXPECT_THAT(answer_to(fmt::format("POST {} HTTP/1.1\r\nHost: {}\r\n\r\n", kPage, here())),
               StartsWith("HTTP/1.1 405"));
-  EXPECT_THAT(get(target, "Content-Length: 5\r\n"), StartsWith("HTTP/1.1 400"));
-  EXPECT_THAT(get(target, "Origin: http://" + here() + "\r\nOrigin: http://evil.example\r\n"),
+  EXPECT_THAT(get(kPage, "Content-Length: 5\r\n"), StartsWith("HTTP/1.1 400"));
+  EXPECT_THAT(get(kPage, "Origin: http://" + here() + "\r\nOrigin: http://evil.example\r\n"),
               StartsWith("HTTP/1.1 400"));
-  EXPECT_THAT(get("/../etc/passwd?token=" + std::string(kToken)), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(get("/../etc/passwd?token=" + kToken), StartsWith("HTTP/1.1 404"));
   EXPECT_THAT(answer_to("\x16\x03\x01 no http at all\r\n\r\n"), StartsWith("HTTP/1.1 400"));
 }
 
 TEST_F(LiveServer, RefusesARequestThatIsTooLong) {
   start();
-  const std::string answer = get("/?token=" + std::string(kToken), "X: " + std::string(100'000, 'x') + "\r\n");
+  const std::string answer = get(kPage, "X: " + std::string(100'000, 'x') + "\r\n");
   EXPECT_THAT(answer, StartsWith("HTTP/1.1 431"));
   const std::string longest(Server::kLongestHeader - 300, 'x');
-  EXPECT_THAT(get("/?token=" + std::string(kToken), "X: " + longest + "\r\n"), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(get(kPage, "X: " + longest + "\r\n"), StartsWith("HTTP/1.1 200"));
 }
 
 TEST_F(LiveServer, ClosesConnectionsBeyondItsBoundUnread) {
   start();
-  asio::io_context io;
   std::vector<tcp::socket> idle;
-  for (std::size_t i = 0; i < Server::kMostRequests; ++i)
-    idle.emplace_back(io).connect({asio::ip::address_v4::loopback(), server_->port()});
-  EXPECT_EQ(get("/?token=" + std::string(kToken)), "");
+  for (std::size_t i = 0; i < Server::kMostRequests; ++i) idle.push_back(connected());
+  EXPECT_EQ(get(kPage), "");
 }
 
 TEST_F(LiveServer, ReadsOnlySoMuchOfARequestThatItHasRefused) {
   start([](Server::Settings& settings) { settings.request_limit = std::chrono::hours(1); });
-  asio::io_context io;
-  tcp::socket socket(io);
-  socket.connect({asio::ip::address_v4::loopback(), server_->port()});
+  tcp::socket socket = connected();
   const std::string piece(1 << 20, 'x');
   error_code failed;
   for (int megabytes = 0; megabytes < 64 && !failed; ++megabytes) asio::write(socket, asio::buffer(piece), failed);
@@ -225,8 +225,7 @@ TEST_F(LiveServer, SendsOneTickPerFrameToWhoReads) {
   EXPECT_EQ(page->hear()["type"], "hello");
   EXPECT_EQ(page->hear()["type"], "history");
   for (int i = 1; i <= 60; ++i) {
-    show(i);
-    server_->draw();
+    draw(i);
     const json tick = page->hear();
     ASSERT_EQ(tick["type"], "tick");
     EXPECT_EQ(tick["time_s"], i);
@@ -242,15 +241,13 @@ TEST_F(LiveServer, SendsFramesByItself) {
 
 TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
   start();
-  const auto first = onlooker();
-  (void)first->hear("history");
+  const auto first = caught_up();
   feed_.tell(line_message(1, "the first line"));
   feed_.tell(step_message({}, {}));
   for (const double limit : {3.0, 2.0})
     feed_.tell(limits_message({{Watched::thrust, "thrust", limit, "N", "campaign"}}));
   for (int i = 1; i <= 2; ++i) {
-    show(i);
-    server_->draw();
+    draw(i);
     (void)first->hear("tick");
   }
   const json history = onlooker()->hear("history");
@@ -263,27 +260,23 @@ TEST_F(LiveServer, TellsWhoComesLateWhatWas) {
 
 TEST_F(LiveServer, AsksForTheStopExactlyOnce) {
   start();
-  const auto page = onlooker(), other = onlooker();
-  (void)page->hear("history"), (void)other->hear("history");
+  const auto page = caught_up(), other = caught_up();
   EXPECT_FALSE(feed_.stop_asked());
   for (int i = 0; i < 3; ++i) page->say("stop");
   EXPECT_EQ(page->hear()["type"], "stop");
   EXPECT_EQ(other->hear()["type"], "stop") << "every page is told";
   EXPECT_TRUE(feed_.stop_asked());
   other->say("stop");
-  show(1);
-  server_->draw();
+  draw(1);
   EXPECT_EQ(page->hear()["type"], "tick") << "it is confirmed once";
   EXPECT_FALSE(feed_.ask_stop());
 }
 
 TEST_F(LiveServer, StopsNothingThatIsOnlyReplayed) {
   start([](Server::Settings& settings) { settings.can_stop = false; });
-  const auto page = onlooker();
-  (void)page->hear("history");
+  const auto page = caught_up();
   page->say("stop");
-  show(1);
-  server_->draw();
+  draw(1);
   EXPECT_EQ(page->hear()["type"], "tick");
   EXPECT_FALSE(feed_.stop_asked());
 }
@@ -292,8 +285,7 @@ TEST_F(LiveServer, DropsWhoSaysAnythingElse) {
   start();
   for (const std::string& word : {std::string("Stop"), std::string("stop "), std::string(), std::string("{}"),
                                   "stop" + std::string(1'000'000, ' ')}) {
-    const auto page = onlooker();
-    (void)page->hear("history");
+    const auto page = caught_up();
     page->say(word);
     EXPECT_TRUE(page->hear().is_discarded()) << word.substr(0, 20);
   }
@@ -305,23 +297,18 @@ TEST_F(LiveServer, DropsWhoSaysAnythingElse) {
 
 TEST_F(LiveServer, DoesNotWaitForTheEndOfAWordThatIsTooLong) {
   start();
-  const auto page = onlooker();
-  (void)page->hear("history");
+  const auto page = caught_up();
   page->begin_to_say(std::string(65, 's'));
   double time_s = 0;
-  EXPECT_TRUE(soon([&] { return show(++time_s), server_->draw(), page->hear().is_discarded(); }, 5s));
+  EXPECT_TRUE(soon([&] { return draw(++time_s), page->hear().is_discarded(); }, 5s));
 }
 
 TEST_F(LiveServer, ServesManyPagesAndRefusesOneTooMany) {
   start([](Server::Settings& settings) { settings.most_clients = 8; });
   std::vector<std::unique_ptr<Onlooker>> pages;
-  for (int i = 0; i < 8; ++i) {
-    pages.push_back(onlooker());
-    (void)pages.back()->hear("history");
-  }
+  for (int i = 0; i < 8; ++i) pages.push_back(caught_up());
   EXPECT_EQ(refusal_of(kToken, here(), "http://" + here()), "HTTP/1.1 503 Service Unavailable");
-  show(7);
-  server_->draw();
+  draw(7);
   for (const auto& page : pages) EXPECT_EQ(page->hear()["time_s"], 7);
   pages.pop_back();
   EXPECT_TRUE(soon([&] {
@@ -333,21 +320,18 @@ TEST_F(LiveServer, ServesManyPagesAndRefusesOneTooMany) {
 
 TEST_F(LiveServer, DropsAClientThatDoesNotReadWhileTheOthersGetEveryFrame) {
   start([](Server::Settings& settings) { settings.patience = 200ms; });
-  const auto slow = onlooker(kToken, 4096), quick = onlooker();
-  (void)quick->hear("history");
+  const auto slow = onlooker(4096), quick = caught_up();
   int frame = 0;
-  const auto draw = [&] {
-    show(++frame);
-    server_->draw();
+  EXPECT_TRUE(soon([&] {
+    draw(++frame);
     EXPECT_EQ(quick->hear()["time_s"], frame) << "the others get every frame";
-  };
-  EXPECT_TRUE(soon([&] { return draw(), server_->clients() == 1; }));
+    return server_->clients() == 1;
+  }));
 }
 
 TEST_F(LiveServer, DropsAClientBehindWhichTooManyMessagesWait) {
   start([](Server::Settings& settings) { settings.most_waiting = 20; });
-  const auto slow = onlooker(kToken, 4096), quick = onlooker();
-  (void)quick->hear("history");
+  const auto slow = onlooker(4096), quick = caught_up();
   const std::string words(1000, 'x');
   EXPECT_TRUE(soon([&] {
     feed_.tell(line_message(1, words));
@@ -366,8 +350,7 @@ TEST_F(LiveServer, NeverMakesTheRunnerWaitEvenWhenItStandsStill) {
 
 TEST_F(LiveServer, DeliversTheLastWordsBeforeItGoes) {
   start();
-  const auto page = onlooker();
-  (void)page->hear("history");
+  const auto page = caught_up();
   show(3);
   feed_.tell(end_message(3, false, "stopped by request; coasted"));
   std::thread going([&] { server_.reset(); });
@@ -380,7 +363,7 @@ TEST_F(LiveServer, DeliversTheLastWordsBeforeItGoes) {
 
 TEST_F(LiveServer, IsGoneSoonWhenAClientDoesNotRead) {
   start();
-  const auto slow = onlooker(kToken, 4096);
+  const auto slow = onlooker(4096);
   for (int i = 0; i < 2000; ++i) {
     feed_.tell(line_message(1, std::string(500, 'x')));
     if (i % 100 == 0) server_->draw();

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -87,8 +86,8 @@ TEST(ConsoleWords, OfTwoStreamsOnOneOutputKeepTheirOrder) {
   Console console;
   std::string expected;
   for (int i = 0; i < 200; ++i) {
-    console.put(i % 2 == 0 ? out.descriptor : words.descriptor, std::to_string(i) + "\n", Worth::kept);
     expected += std::to_string(i) + "\n";
+    console.put(i % 2 == 0 ? out.descriptor : words.descriptor, std::to_string(i) + "\n", Worth::kept);
   }
   ASSERT_TRUE(console.finish(5s));
   EXPECT_EQ(output.read(), expected);
@@ -121,6 +120,7 @@ TEST(ConsoleWords, AreForgottenWhenTheirReaderIsGone) {
   {
     Console console;
     EXPECT_FALSE(console.is_used());
+    EXPECT_TRUE(console.finish(0ms)) << "no words need no thread";
     for (int i = 0; i < 10; ++i) console.put(ends[1], "to nobody\n", Worth::kept);
     console.put(ends[0], "to nothing\n", Worth::kept);
     EXPECT_TRUE(console.finish(5s));
@@ -128,11 +128,6 @@ TEST(ConsoleWords, AreForgottenWhenTheirReaderIsGone) {
   }
   ::close(ends[1]);
   ::signal(SIGPIPE, ignored);
-}
-
-TEST(ConsoleWords, NeedNoThreadBeforeThereAreAny) {
-  Console console;
-  EXPECT_TRUE(console.finish(0ms));
 }
 
 class Words : public testing::Test {

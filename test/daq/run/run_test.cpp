@@ -23,17 +23,16 @@ using testing::ThrowsMessage;
 
 double to_rad_per_sec(double rpm) { return from_rpm(rpm).value(); }
 
-constexpr double kTrueK5x3 = 1.7e-8 / (kRadPerSecPerRpm * kRadPerSecPerRpm);
-
 class OneRun : public testing::Test {
  protected:
   explicit OneRun(int seed = 1) : config_(test::deterministic_config(seed)), bench_(config_) {
     bench_.mounted("5x3", 0);
   }
 
-  RunResult record(const std::function<bool()>& stop_asked = [] { return false; }) {
-    return record_run(bench_, test::first_run(campaign_, config_, file()), progress_, stop_asked);
+  RunResult record(const std::function<bool()>& stop_asked = test::never) {
+    return record_run(bench_, test::first_run(campaign_, config_, file()), said_, stop_asked);
   }
+  [[nodiscard]] results::RunRecording recorded() { return results::read_run(record().file); }
   [[nodiscard]] std::filesystem::path file() const { return folder_.path() / "5x3_phi000_rep1.h5"; }
   [[nodiscard]] std::filesystem::path aborted_file() const { return folder_.path() / "5x3_phi000_rep1.aborted.h5"; }
 
@@ -43,12 +42,11 @@ class OneRun : public testing::Test {
   profiles::Campaign campaign_ = test::short_campaign();
   profiles::BenchConfig config_;
   DeterministicBench bench_;
-  Progress progress_;
+  test::SaidLines said_;
 };
 
 TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
-  const RunResult result = record();
-  const results::RunRecording run = results::read_run(result.file);
+  const results::RunRecording run = recorded();
   std::vector<Phase> phases;
   for (const auto& mark : run.phases) phases.push_back(mark.phase);
   EXPECT_THAT(phases, testing::ElementsAre(Phase::zero_before, Phase::step, Phase::step, Phase::step, Phase::step,
@@ -59,7 +57,7 @@ TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
 TEST_F(OneRun, HoldsNothingThatWasReadBeforeItBegan) {
   bench_.wait_until(bench_.clock().now() + std::chrono::seconds(2));
   const Instant began = bench_.clock().now();
-  const results::RunRecording run = results::read_run(record().file);
+  const results::RunRecording run = recorded();
   ASSERT_FALSE(run.motor.empty());
   for (const auto& reading : run.motor) ASSERT_GE(Instant(reading.time_ns), began - std::chrono::milliseconds(20));
   for (const auto& sample : run.load_cell) ASSERT_GE(Instant(sample.arrival_ns), began);
@@ -74,18 +72,13 @@ TEST_F(OneRun, LosesNoSampleAndSaysSo) {
 }
 
 TEST_F(OneRun, MeasuresTheThrustThatTheBenchWasBuiltWith) {
-  const auto steps = reduce(results::read_run(record().file));
+  const auto steps = reduce(recorded());
   ASSERT_EQ(steps.size(), 4u);
   for (const auto& step : steps) {
     EXPECT_EQ(step.quality_flags, 0u) << step.step;
     EXPECT_NEAR(step.speed_rad_s, step.commanded_speed_rad_s, 0.005 * step.commanded_speed_rad_s);
-    EXPECT_NEAR(step.thrust_n, kTrueK5x3 * step.speed_rad_s * step.speed_rad_s, 0.01 + 0.01 * step.thrust_n);
+    EXPECT_NEAR(step.thrust_n, test::kTrueK5x3 * step.speed_rad_s * step.speed_rad_s, 0.01 + 0.01 * step.thrust_n);
   }
-}
-
-TEST_F(OneRun, LeavesTheMotorCoasting) {
-  (void)record();
-  EXPECT_TRUE(motor_is_let_go());
 }
 
 TEST_F(OneRun, EndsWithACoastThatFeedsNothingBack) {
@@ -98,6 +91,7 @@ TEST_F(OneRun, EndsWithACoastThatFeedsNothingBack) {
   EXPECT_EQ(result.stop->outcome, iq::StopReport::Outcome::standing);
   EXPECT_LT(to_seconds(result.stop->time_to_coast.value()), 0.05);
   EXPECT_LT(highest_v, 12.1) << "the supply cannot sink";
+  EXPECT_TRUE(motor_is_let_go());
 }
 
 TEST_F(OneRun, RampsDownOnASupplyThatSinksCurrent) {
@@ -142,17 +136,6 @@ TEST_F(OneRun, DelaysARampThatItServesLateInsteadOfJumping) {
   }
 }
 
-TEST_F(OneRun, LetsGoAtOnceAtATripAndSaysWhatBecameOfTheMotor) {
-  campaign_.limits["thrust_max_n"] = 2.0;
-  try {
-    (void)record();
-    FAIL();
-  } catch (const SafetyStop& stop) {
-    EXPECT_THAT(stop.what(),
-                testing::ContainsRegex("motor: coast confirmed after 0[.]0.*(at rest after|slowing down at)"));
-  }
-}
-
 TEST_F(OneRun, NeverOverwritesAnEarlierRun) {
   (void)record();
   const std::string before = test::bytes_of(file());
@@ -178,14 +161,11 @@ TEST_F(OneRun, StopsOnRequestAtAnyTickLetsTheMotorGoAndKeepsWhatItHas) {
   EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
-TEST_F(OneRun, StopsWhenALimitIsPassedAndNamesIt) {
+TEST_F(OneRun, StopsAtOnceWhenALimitIsPassedNamesItAndSaysWhatBecameOfTheMotor) {
   campaign_.limits["thrust_max_n"] = 2.0;
-  try {
-    (void)record();
-    FAIL() << "6 N of thrust passed a limit of 2 N";
-  } catch (const SafetyStop& e) {
-    EXPECT_THAT(e.what(), HasSubstr("is above 2 N"));
-  }
+  EXPECT_THAT(test::words_of<SafetyStop>([&] { return record(); }),
+              AllOf(HasSubstr("is above 2 N"),
+                    testing::ContainsRegex("motor: coast confirmed after 0[.]0.*(at rest after|slowing down at)")));
   EXPECT_TRUE(motor_is_let_go());
   EXPECT_THAT(results::read_run(aborted_file()).outcome_reason, HasSubstr("is above 2 N"));
 }
@@ -217,14 +197,10 @@ TEST_F(OneRun, StopsWhenTheDiskIsFullAndLosesNothingWritten) {
 }
 
 TEST_F(OneRun, StopsWhenAnExceptionComesFromTheProgressDisplay) {
-  class Broken final : public Progress {
-   public:
-    void tick(const Position& position, const Observation&) override {
-      if (position.step == 2) throw std::runtime_error("the terminal went away");
-    }
-  } broken;
-  EXPECT_THROW((void)record_run(bench_, test::first_run(campaign_, config_, file()), broken, [] { return false; }),
-               std::runtime_error);
+  said_.at_tick = [](const Position& position, const Observation&) {
+    if (position.step == 2) throw std::runtime_error("the terminal went away");
+  };
+  EXPECT_THROW((void)record(), std::runtime_error);
   EXPECT_TRUE(motor_is_let_go());
 }
 
@@ -243,8 +219,8 @@ class FailingLink : public testing::Test {
     };
     Progress progress;
     try {
-      (void)record_run(bench_, test::first_run(test::short_campaign(), config_, folder_.path() / "5x3_phi000_rep1.h5"),
-                       progress, [] { return false; });
+      (void)record_run(bench_, test::first_run(test::short_campaign(), config_, folder_.path() / "run.h5"), progress,
+                       test::never);
     } catch (const SafetyStop& stop) {
       return stop.words();
     }
@@ -267,33 +243,24 @@ TEST_F(FailingLink, IsAConsequenceOfWhatTheGuardHadSeenBefore) {
   EXPECT_THAT(words.consequences, HasSubstr("the port is gone"));
 }
 
-TEST_F(FailingLink, IsToldOnceWhenTheGuardSawItToo) {
+TEST_F(FailingLink, IsToldOnceWhenTheGuardSawItTooAndIsTheCauseWhenTheGuardSawNothing) {
+  EXPECT_THAT(record_until_it_fails([] {}).cause, HasSubstr("the port is gone"));
   const StopWords words = record_until_it_fails([&] { bench_.spoilt_motor.lost = "unplugged"; });
   EXPECT_THAT(words.cause, HasSubstr("unplugged"));
   EXPECT_THAT(words.line(), testing::Not(HasSubstr("the port is gone")));
 }
 
-TEST_F(FailingLink, IsTheCauseWhenTheGuardSawNothing) {
-  const StopWords words = record_until_it_fails([] {});
-  EXPECT_THAT(words.cause, HasSubstr("the port is gone"));
-}
-
 TEST(RunFromASeed, GivesTheSameBytesTwiceAndOthersFromAnotherSeed) {
-  const auto bytes_from = [](int seed) {
-    const test::TemporaryFolder folder;
-    const profiles::BenchConfig config = test::deterministic_config(seed);
-    const profiles::Campaign campaign = test::short_campaign();
-    DeterministicBench bench(config);
-    bench.mounted("5x3", 0);
-    Progress progress;
-    const auto file = folder.path() / "run.h5";
-    (void)record_run(bench, test::first_run(campaign, config, file), progress, [] { return false; });
-    return test::bytes_of(file);
+  class SeededRun final : public OneRun {
+   public:
+    explicit SeededRun(int seed) : OneRun(seed) {}
+    void TestBody() override {}
+    std::string bytes() { return test::bytes_of(record().file); }
   };
-  const std::string once = bytes_from(7);
+  const std::string once = SeededRun(7).bytes();
   EXPECT_GT(once.size(), 500'000u);
-  EXPECT_TRUE(once == bytes_from(7));
-  EXPECT_FALSE(once == bytes_from(8));
+  EXPECT_TRUE(once == SeededRun(7).bytes());
+  EXPECT_FALSE(once == SeededRun(8).bytes());
 }
 
 TEST(UtcText, IsIso8601) {

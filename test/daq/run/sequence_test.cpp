@@ -7,19 +7,15 @@ namespace sequence_test {
 
 using std::chrono::milliseconds;
 
-TEST(Slew, GoesStraightAndNoFasterThanItsRate) {
-  const Slew slew(RadPerSec(100), RadPerSec(300), 400.0);
-  EXPECT_EQ(slew.lasts(), milliseconds(500));
-  EXPECT_EQ(slew.at(Duration(0)), RadPerSec(100));
-  EXPECT_NEAR(slew.at(milliseconds(250)).value(), 200, 1e-9);
-  EXPECT_EQ(slew.at(milliseconds(500)), RadPerSec(300));
-  EXPECT_EQ(slew.at(std::chrono::hours(1)), RadPerSec(300));
-}
-
-TEST(Slew, GoesDownLikewise) {
-  const Slew slew(RadPerSec(300), RadPerSec(100), 400.0);
-  EXPECT_EQ(slew.lasts(), milliseconds(500));
-  EXPECT_NEAR(slew.at(milliseconds(125)).value(), 250, 1e-9);
+TEST(Slew, GoesStraightAndNoFasterThanItsRateUpAndDown) {
+  for (const auto& [from, to] : {std::pair(100.0, 300.0), std::pair(300.0, 100.0)}) {
+    const Slew slew(RadPerSec(from), RadPerSec(to), 400.0);
+    EXPECT_EQ(slew.lasts(), milliseconds(500));
+    EXPECT_EQ(slew.at(Duration(0)), RadPerSec(from));
+    EXPECT_NEAR(slew.at(milliseconds(125)).value(), 0.75 * from + 0.25 * to, 1e-9);
+    EXPECT_EQ(slew.at(milliseconds(500)), RadPerSec(to));
+    EXPECT_EQ(slew.at(std::chrono::hours(1)), RadPerSec(to));
+  }
 }
 
 TEST(Slew, TakesNoTimeWithoutARateOrWithoutAChange) {

@@ -1,7 +1,6 @@
 #include "daq/run/speed_cap.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 namespace kphi::daq {
 namespace speed_cap_test {
@@ -9,7 +8,9 @@ namespace speed_cap_test {
 using results::QualityFlag;
 using results::StepMean;
 
-StepMean step(double commanded, double reached, std::initializer_list<QualityFlag> flags = {}) {
+using Flags = std::vector<QualityFlag>;
+
+StepMean step(double commanded, double reached, const Flags& flags = {}) {
   StepMean step;
   step.commanded_speed_rad_s = commanded;
   step.speed_rad_s = reached;
@@ -17,33 +18,28 @@ StepMean step(double commanded, double reached, std::initializer_list<QualityFla
   return step;
 }
 
+const Flags kShortOfDrive{QualityFlag::drive_saturated, QualityFlag::speed_not_reached};
 const StepMean kHeld = step(1700, 1700);
 const StepMean kBarely = step(1800, 1795, {QualityFlag::drive_saturated});
-const StepMean kShort = step(1900, 1820, {QualityFlag::drive_saturated, QualityFlag::speed_not_reached});
+const StepMean kShort = step(1900, 1820, kShortOfDrive);
 
 TEST(SpeedCap, IsTheHighestLevelThatWasReachedWithDriveToSpare) {
   SpeedCap cap;
-  const auto lesson =
-      cap.learn(std::vector{step(1600, 1600), kHeld, kBarely, kShort,
-                            step(2000, 1820, {QualityFlag::drive_saturated, QualityFlag::speed_not_reached})});
+  const auto lesson = cap.learn(std::vector{step(1600, 1600), kHeld, kBarely, kShort, step(2000, 1820, kShortOfDrive)});
   ASSERT_TRUE(lesson);
   EXPECT_EQ(lesson->commanded, RadPerSec(1900));
   EXPECT_EQ(lesson->reached, RadPerSec(1820));
   EXPECT_EQ(lesson->cap, RadPerSec(1700));
   EXPECT_EQ(cap.speed(), RadPerSec(1700));
-}
-
-TEST(SpeedCap, IsLearnedInAnyOrderOfSteps) {
-  SpeedCap cap;
-  EXPECT_TRUE(cap.learn(std::vector{kShort, kHeld, kBarely}));
-  EXPECT_EQ(cap.speed(), RadPerSec(1700));
+  SpeedCap of_any_order;
+  EXPECT_TRUE(of_any_order.learn(std::vector{kShort, kHeld, kBarely}));
+  EXPECT_EQ(of_any_order.speed(), RadPerSec(1700));
 }
 
 TEST(SpeedCap, IsNotLearnedFromASpeedThatWasMissedForAnotherReason) {
   SpeedCap cap;
   EXPECT_FALSE(cap.learn(std::vector{kHeld, step(1900, 1820, {QualityFlag::speed_not_reached})}));
-  EXPECT_FALSE(
-      cap.learn(std::vector{kHeld, step(1900, 1999, {QualityFlag::drive_saturated, QualityFlag::speed_not_reached})}));
+  EXPECT_FALSE(cap.learn(std::vector{kHeld, step(1900, 1999, kShortOfDrive)}));
   EXPECT_FALSE(cap.learn(std::vector{kHeld, kBarely})) << "reached all the same";
   EXPECT_FALSE(cap.learn(std::vector{kShort})) << "no level was held: a cap would leave nothing";
   EXPECT_FALSE(cap.speed());
@@ -61,8 +57,7 @@ TEST(SpeedCap, FallsAndNeverRises) {
   ASSERT_TRUE(cap.learn(std::vector{step(1600, 1600), kShort}));
   EXPECT_FALSE(cap.learn(std::vector{kHeld, kShort})) << "nothing new";
   EXPECT_EQ(cap.speed(), RadPerSec(1600));
-  ASSERT_TRUE(cap.learn(
-      std::vector{step(1500, 1500), step(1600, 1550, {QualityFlag::drive_saturated, QualityFlag::speed_not_reached})}));
+  ASSERT_TRUE(cap.learn(std::vector{step(1500, 1500), step(1600, 1550, kShortOfDrive)}));
   EXPECT_EQ(cap.speed(), RadPerSec(1500));
 }
 

@@ -1,7 +1,6 @@
 #include "daq/virtual/deterministic_air.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/error.hpp"
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "test/drivers/ambient/fake_bridge.hpp"
 #include "test/refusal.hpp"
 
@@ -20,9 +22,18 @@ TEST(Mcp2221, FreesTheBusAndSetsTheSpeedWhenItOpens) {
   EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x61}, Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
 }
 
-TEST(Mcp2221, ReadsARegisterInTheFramesOfTheManual) {
+class OpenMcp2221 : public testing::Test {
+ protected:
+  std::uint8_t chip_id() {
+    std::array<std::uint8_t, 1> data{};
+    bridge.read(0x76, 0xD0, data);
+    return data[0];
+  }
   FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
+  Mcp2221 bridge{usb, no_pause};
+};
+
+TEST_F(OpenMcp2221, ReadsARegisterInTheFramesOfTheManual) {
   usb.commands.clear();
   std::array<std::uint8_t, 8> data{};
   bridge.read(0x76, 0xF7, data);
@@ -31,43 +42,38 @@ TEST(Mcp2221, ReadsARegisterInTheFramesOfTheManual) {
               ElementsAre(Bytes{0x94, 1, 0, 0xEC, 0xF7}, Bytes{0x10}, Bytes{0x93, 8, 0, 0xEC}, Bytes{0x40}));
 }
 
-TEST(Mcp2221, GathersAReadingLongerThanOneReport) {
-  FakeBridge usb;
+TEST_F(OpenMcp2221, GathersAReadingLongerThanOneReport) {
   for (int i = 0; i < 100; ++i) usb.registers[i] = static_cast<std::uint8_t>(i);
-  Mcp2221 bridge(usb, no_pause);
   std::array<std::uint8_t, 100> data{};
   bridge.read(0x76, 0, data);
   for (int i = 0; i < 100; ++i) ASSERT_EQ(data[static_cast<std::size_t>(i)], i);
 }
 
-TEST(Mcp2221, SeesAMissingAcknowledgement) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
+TEST_F(OpenMcp2221, SeesAMissingAcknowledgement) {
   std::array<std::uint8_t, 1> data{};
   EXPECT_THAT(refusal([&] { bridge.read(0x40, 0xD0, data); }), HasSubstr("no device answers at this address"));
   EXPECT_THAT(refusal([&] { bridge.write(0x40, data); }), HasSubstr("0x25"));
-  bridge.read(0x76, 0xD0, data);
-  EXPECT_EQ(data[0], 0x60) << "the bus is free again";
+  EXPECT_EQ(chip_id(), 0x60) << "the bus is free again";
 }
 
-TEST(Mcp2221, AsksAgainWhileTheBridgeIsBusy) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
+TEST_F(OpenMcp2221, AsksAgainWhileTheBridgeIsBusy) {
   usb.busy = 3;
-  std::array<std::uint8_t, 1> data{};
-  bridge.read(0x76, 0xD0, data);
-  EXPECT_EQ(data[0], 0x60);
+  EXPECT_EQ(chip_id(), 0x60);
 }
 
-TEST(Mcp2221, GivesUpABridgeThatStaysBusy) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
-  usb.spoil = [](Bytes& answer) {
-    if (answer[0] == 0x94) answer[1] = 1, answer[2] = 0x01;
-    return false;
+TEST_F(OpenMcp2221, NamesWhatKeepsItFromReading) {
+  const auto refused = [&](std::uint8_t command, std::map<std::size_t, std::uint8_t> spoilt) {
+    usb.spoil = [=](Bytes& answer) {
+      for (const auto& [at, value] : spoilt) answer[at] = answer[0] == command ? value : answer[at];
+      return false;
+    };
+    return refusal([&] { return chip_id(); });
   };
-  std::array<std::uint8_t, 1> data{};
-  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("busy"));
+  EXPECT_THAT(refused(0x94, {{1, 1}, {2, 0x01}}), HasSubstr("busy")) << "for good";
+  EXPECT_THAT(refused(0x10, {{8, 0x12}}), HasSubstr("held low"));
+  EXPECT_THAT(refused(0x40, {{3, 60}}), HasSubstr("more bytes")) << "than it asked for";
+  usb.next_write = usb::Outcome::gone;
+  EXPECT_THAT(refused(0, {}), HasSubstr("unplugged"));
 }
 
 TEST(Mcp2221, PassesOverAnswersToAnotherCommand) {
@@ -80,17 +86,6 @@ TEST(Mcp2221, PassesOverAnswersToAnotherCommand) {
   EXPECT_EQ(data[0], 0x60);
 }
 
-TEST(Mcp2221, NamesTheBusThatIsHeldLow) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
-  usb.spoil = [](Bytes& answer) {
-    if (answer[0] == 0x10) answer[8] = 0x12;
-    return false;
-  };
-  std::array<std::uint8_t, 1> data{};
-  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("held low"));
-}
-
 TEST(Mcp2221, CancelsATransferThatKeepsTheSpeedFromBeingSet) {
   FakeBridge usb;
   int busy = 1;
@@ -101,25 +96,6 @@ TEST(Mcp2221, CancelsATransferThatKeepsTheSpeedFromBeingSet) {
   Mcp2221 bridge(usb, no_pause);
   EXPECT_THAT(usb.commands, ElementsAre(Bytes{0x61}, Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75},
                                         Bytes{0x10, 0, 0x10}, Bytes{0x10, 0, 0, 0x20, 0x75}));
-}
-
-TEST(Mcp2221, SaysWhenItIsUnplugged) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
-  usb.next_write = usb::Outcome::gone;
-  std::array<std::uint8_t, 1> data{};
-  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("unplugged"));
-}
-
-TEST(Mcp2221, NeverTakesMoreThanItAskedFor) {
-  FakeBridge usb;
-  Mcp2221 bridge(usb, no_pause);
-  usb.spoil = [](Bytes& answer) {
-    if (answer[0] == 0x40) answer[3] = 60;
-    return false;
-  };
-  std::array<std::uint8_t, 2> data{};
-  EXPECT_THAT(refusal([&] { bridge.read(0x76, 0xD0, data); }), HasSubstr("more bytes"));
 }
 
 }  // namespace mcp2221_test

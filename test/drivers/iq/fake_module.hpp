@@ -117,24 +117,17 @@ class Module {
     std::vector<Bytes> replies;
     std::size_t at = 0;
     while (at < buffer_.size()) {
-      if (buffer_[at] != 0x55) {
+      const std::size_t left = buffer_.size() - at;
+      const std::size_t length = left > 1 ? buffer_[at + 1] : 0;
+      if (buffer_[at] != 0x55 || length > 59) {
         ++at;
         continue;
       }
-      if (at + 1 >= buffer_.size()) break;
-      const std::size_t length = buffer_[at + 1];
-      if (length > 59) {
-        ++at;
-        continue;
-      }
-      if (at + length + 5 > buffer_.size()) break;
+      if (left < length + 5) break;
       const std::uint16_t crc = crc16(&buffer_[at + 1], length + 2);
-      if (buffer_[at + length + 3] != (crc & 0xFF) || buffer_[at + length + 4] != crc >> 8) {
-        ++at;
-        continue;
-      }
-      if (length >= 2) act(&buffer_[at], length, replies);
-      at += length + 5;
+      const bool good = buffer_[at + length + 3] == (crc & 0xFF) && buffer_[at + length + 4] == crc >> 8;
+      if (good && length >= 2) act(&buffer_[at], length, replies);
+      at += good ? length + 5 : 1;
     }
     buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(at));
     return replies;

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -16,7 +17,11 @@ namespace kphi::iq::fake {
 
 class ModuleOnALine {
  public:
-  ModuleOnALine() : thread_([this] { run(); }) {}
+  /// `prepare`: what is different about this module.
+  explicit ModuleOnALine(const std::function<void(Module&)>& prepare = [](Module&) {}) {
+    prepare(module_);
+    thread_ = std::thread([this] { run(); });
+  }
   ~ModuleOnALine() { unplug(); }
   ModuleOnALine(const ModuleOnALine&) = delete;
   ModuleOnALine& operator=(const ModuleOnALine&) = delete;
@@ -54,6 +59,10 @@ class ModuleOnALine {
     }
     const std::lock_guard lock(mutex_);
     return module_.last_motion() != nullptr && module_.last_motion()->is_coast();
+  }
+  /// Motion commands but for coasts.
+  [[nodiscard]] std::size_t motions() {
+    return with([](Module& m) { return m.count([](const auto& h) { return h.is_motion() && !h.is_coast(); }); });
   }
   [[nodiscard]] bool heard_a_speed(double speed) {
     return wait_for([&](const Module& m) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -60,9 +61,13 @@ class Wire {
     while (session.state() != state && now < end) run_for(1ms);
     return session.state() == state;
   }
-  void connect() {
+  void connect(Duration limit = 1s) {
     session.connect(now);
-    ASSERT_TRUE(run_to_state(State::ready, 1s)) << session.failure();
+    ASSERT_TRUE(run_to_state(State::ready, limit)) << session.failure();
+  }
+  void expect_failure(const std::string& words, Duration limit = 1s) {
+    ASSERT_TRUE(run_to_state(State::failed, limit)) << words;
+    EXPECT_NE(session.failure().find(words), std::string::npos) << session.failure();
   }
   void deliver(const Bytes& bytes, Duration delay = {}) { arrivals_.emplace(now + delay, bytes); }
   [[nodiscard]] std::size_t replies_on_their_way() const { return arrivals_.size(); }
@@ -103,5 +108,19 @@ class Wire {
  private:
   std::multimap<Instant, Bytes> arrivals_;
 };
+
+/// Connected, and what the first moments brought has been read.
+struct Connected : Wire {
+  explicit Connected(Duration moments = {}, const Settings& settings = {}) : Wire(settings) {
+    connect();
+    if (moments == Duration{}) return;
+    run_for(moments);
+    readings();
+  }
+};
+
+inline bool is_reply(const Bytes& reply, int type, int sub) {
+  return reply.size() > 4 && reply[2] == type && reply[3] == sub;
+}
 
 }  // namespace kphi::iq::fake

@@ -46,27 +46,13 @@ struct Key {
 };
 
 Key key_of(MotorChannel quantity, bool legacy) {
-  switch (quantity) {
-    case MotorChannel::speed:
-      return {50, 13};
-    case MotorChannel::supply_voltage:
-      return {69, 0};
-    case MotorChannel::supply_current:
-      return {69, 1};
-    case MotorChannel::motor_current:
-      return {50, 36};
-    case MotorChannel::coil_temperature:
-      return legacy ? Key{77, 0} : Key{83, 0};
-    case MotorChannel::derate:
-      return {50, 41};
-    case MotorChannel::drive_mode:
-      return {50, 0};
-    case MotorChannel::drive_pwm:
-      return {50, 8};
-    case MotorChannel::fault_now:
-      return {84, 0};
-  }
-  return {0, 0};
+  static const std::map<MotorChannel, Key> kKeys{
+      {MotorChannel::speed, {50, 13}},         {MotorChannel::supply_voltage, {69, 0}},
+      {MotorChannel::supply_current, {69, 1}}, {MotorChannel::motor_current, {50, 36}},
+      {MotorChannel::derate, {50, 41}},        {MotorChannel::drive_mode, {50, 0}},
+      {MotorChannel::drive_pwm, {50, 8}},      {MotorChannel::fault_now, {84, 0}}};
+  if (quantity == MotorChannel::coil_temperature) return legacy ? Key{77, 0} : Key{83, 0};
+  return kKeys.at(quantity);
 }
 
 std::uint32_t bits_of(std::span<const std::uint8_t> data) {

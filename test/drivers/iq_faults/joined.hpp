@@ -22,7 +22,7 @@ struct Manner {
   Duration reply_jitter = std::chrono::microseconds(50);
   Duration usb_tick{0};
   std::size_t port_takes = 0;  ///< bytes that the host's port takes per tick; 0: all
-  sim::IqQuirks quirks;
+  sim::IqQuirks quirks{};
 };
 
 class Joined {

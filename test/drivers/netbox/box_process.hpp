@@ -54,12 +54,6 @@ struct Ports {
   std::uint16_t rdt = 0, http = 0;
 };
 
-/// The XML of a box that streams at 7000 / divisor records per second.
-inline std::string streaming_xml(unsigned records_per_datagram, unsigned divisor = 1) {
-  const std::string rate = std::to_string(7000 / divisor), size = std::to_string(records_per_datagram);
-  return with(with(captured_xml(), "comrdtrate", rate.c_str()), "comrdtbsiz", size.c_str());
-}
-
 class BoxProcess {
  public:
   explicit BoxProcess(const FakeBox::Manner& manner) : child_(fork()) {

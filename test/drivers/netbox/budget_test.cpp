@@ -5,8 +5,7 @@
 
 #include "test/drivers/netbox/receivers.hpp"
 
-namespace kphi::netbox {
-namespace budget_test {
+namespace kphi::netbox::budget_test {
 
 using namespace std::chrono_literals;
 using namespace test;
@@ -57,5 +56,4 @@ TEST(Budget, ASingleRecordForWhoOnlyTakesCostsAFractionOfAWakeUp) {
 
 TEST(Budget, ABlockIsHandedOverAtOnce) { expect_within({true, Driver::Consumer::waits}, {2.5, 0.05, 200us}); }
 
-}  // namespace budget_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::budget_test

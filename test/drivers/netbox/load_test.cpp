@@ -5,8 +5,7 @@
 #include "test/drivers/netbox/busy_loops.hpp"
 #include "test/drivers/netbox/receivers.hpp"
 
-namespace kphi::netbox {
-namespace load_test {
+namespace kphi::netbox::load_test {
 
 using namespace std::chrono_literals;
 using namespace test;
@@ -42,5 +41,4 @@ TEST(Load, BesideTwoBusyLoopsNothingIsLostAndNothingIsOld) {
   EXPECT_LT(driver.age(99), 20ms);
 }
 
-}  // namespace load_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::load_test

@@ -65,4 +65,10 @@ inline std::string with(std::string xml, const std::string& element, const char*
   return xml.replace(begin, end + closing.size() - begin, replacement);
 }
 
+/// The XML of a box that streams at 7000 / divisor records per second.
+inline std::string streaming_xml(unsigned records_per_datagram = 40, unsigned divisor = 1) {
+  const std::string rate = std::to_string(7000 / divisor), size = std::to_string(records_per_datagram);
+  return with(with(captured_xml(), "comrdtrate", rate.c_str()), "comrdtbsiz", size.c_str());
+}
+
 }  // namespace kphi::netbox::test

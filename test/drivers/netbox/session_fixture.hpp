@@ -9,6 +9,7 @@
 
 #include "drivers/netbox/stream/session.hpp"
 #include "test/drivers/netbox/record_bytes.hpp"
+#include "test/drivers/netbox/stream/feed.hpp"
 
 namespace kphi::netbox::test {
 
@@ -34,11 +35,23 @@ class SessionTest : public testing::Test {
     session.advance(now);
   }
   void receive(const Bytes& datagram) { session.receive(datagram, now, out); }
+  /// Forty records from `rdt` on, their ft_sequence so far ahead.
+  void receive_block(std::uint32_t rdt, std::uint32_t ft_ahead = 999) { receive(records(rdt, rdt + ft_ahead, 40)); }
+  /// Blocks as a box sends them, from the second one on, until `end`; the session's time goes on.
+  void stream_until(Instant end) {
+    for (std::uint32_t i = 1; now < end; ++i) {
+      now += settings.datagram_period();
+      receive_block(1 + 40 * i);
+      session.advance(now);
+    }
+  }
+  /// What is not zero of a few: "lost 1, late 2".
+  [[nodiscard]] std::string counted() const { return words_of(session.counters()); }
   void start_streaming(std::uint32_t ft = 1000) {
     session.start(now);
     advance_to_deadline();
     told();
-    receive(records(1, ft, 40));
+    receive_block(1, ft - 1);
     ASSERT_EQ(session.state(), State::streaming);
   }
 

@@ -5,20 +5,13 @@
 
 #include <vector>
 
-#include "drivers/netbox/receive/load_cell.hpp"
 #include "test/drivers/netbox/box_process.hpp"
-#include "test/soon.hpp"
+#include "test/drivers/netbox/load_cell_bench.hpp"
 
-namespace kphi::netbox {
-namespace standstill_test {
+namespace kphi::netbox::standstill_test {
 
 using namespace std::chrono_literals;
-using kphi::test::soon;
-using test::FakeBox;
-using test::FakeWeb;
-using test::Pipe;
-using test::Ports;
-using test::streaming_xml;
+using namespace test;
 
 /// The child's life: streams 15 000 records and tells its account.
 void be_the_reader(const Pipe& orders, const Pipe& reports) {
@@ -64,21 +57,17 @@ TEST(Standstill, AProcessStoppedForASecondLosesNothingOneRecordPerDatagram) {
 }
 
 TEST(Standstill, AConsumerThatStandsStillForFiveSecondsLosesNothing) {
-  FakeWeb web(FakeWeb::page(streaming_xml(1)));
-  FakeBox box({.records_per_datagram = 1});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
-  ASSERT_TRUE(soon([&] { return cell.counters().received >= 35'000; }));
-  cell.stop();
-  const Counters counters = cell.counters();
+  Bench bench({.records_per_datagram = 1});
+  bench.cell.start();
+  ASSERT_TRUE(soon([&] { return bench.cell.counters().received >= 35'000; }));
+  bench.cell.stop();
+  const Counters counters = bench.cell.counters();
   EXPECT_EQ(counters.queue_overflows + counters.lost_network + counters.lost_host, 0u);
-  EXPECT_GE(cell.health().queue_high_water, 35'000u);
-  EXPECT_NEAR(cell.health().records_per_second, 7000, 200);
+  EXPECT_GE(bench.cell.health().queue_high_water, 35'000u);
+  EXPECT_NEAR(bench.cell.health().records_per_second, 7000, 200);
   std::vector<LoadCellRecord> taken(counters.received + 1);
-  EXPECT_EQ(cell.take(taken), counters.received);
+  EXPECT_EQ(bench.cell.take(taken), counters.received);
   for (std::size_t i = 1; i < counters.received; ++i) ASSERT_EQ(taken[i].ft_sequence, taken[i - 1].ft_sequence + 1);
 }
 
-}  // namespace standstill_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::standstill_test

@@ -1,6 +1,5 @@
 // What other clients of this box got wrong, one test each.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/time.h>
 
@@ -10,28 +9,17 @@
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/netbox/configuration/http.hpp"
 #include "drivers/netbox/configuration/settings.hpp"
-#include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/netbox/receive/udp_socket.hpp"
 #include "drivers/netbox/stream/session.hpp"
 #include "drivers/netbox/wire/status.hpp"
-#include "test/drivers/netbox/fake_box.hpp"
+#include "test/drivers/netbox/load_cell_bench.hpp"
 #include "test/drivers/netbox/settable_web.hpp"
-#include "test/soon.hpp"
 
-namespace kphi::netbox {
-namespace traps_test {
+namespace kphi::netbox::traps_test {
 
 using namespace std::chrono_literals;
-using kphi::test::soon;
-using test::Bytes;
-using test::captured_xml;
-using test::FakeBox;
-using test::FakeWeb;
-using test::records;
-using test::with;
+using namespace test;
 using SteadyTime = std::chrono::steady_clock;
-
-std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
 
 /// A peer of the driver's socket, told where that is by its first datagram.
 class Peer {
@@ -47,7 +35,7 @@ class Peer {
   [[nodiscard]] ssize_t received() const { return received_; }
 
  private:
-  test::LoopbackSocket socket_;
+  LoopbackSocket socket_;
   sockaddr_in from_{};
   socklen_t length_ = sizeof from_;
   std::uint8_t bytes_[64]{};
@@ -104,27 +92,25 @@ TEST_F(TrapsOfTheSequence, NumbersAreNotComparedUnsigned) {
 }
 
 TEST(Traps, TheBoxDoesNotStreamToADeadPortAfterTheEnd) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({});
-  const SteadyClock clock;
+  BenchBox bench;
   {
-    LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
+    LoadCell cell(bench.address, bench.clock);
     cell.start();
     ASSERT_TRUE(cell.wait(20s));
   }
-  EXPECT_TRUE(soon([&] { return !box.streaming(); }));
+  EXPECT_TRUE(soon([&] { return !bench.box.streaming(); }));
 }
 
 TEST_F(TrapsOfTheSequence, NoFilterTouchesTheCounts) {
   Bytes bytes;
-  for (std::uint32_t i = 0; i < 40; ++i) test::put_record(bytes, 2 + i, 1002 + i, 0, i % 2 == 0 ? 1'000'000 : -7);
+  for (std::uint32_t i = 0; i < 40; ++i) put_record(bytes, 2 + i, 1002 + i, 0, i % 2 == 0 ? 1'000'000 : -7);
   session.receive(bytes, 1s, out);
   ASSERT_EQ(out.size(), 41u);
   for (std::size_t i = 0; i < 40; ++i) EXPECT_EQ(out[i + 1].counts[2], i % 2 == 0 ? 1'000'000 : -7);
 }
 
 TEST(Traps, ASettingIsWrittenByItsNameAndWithAnEqualsSign) {
-  test::SettableWeb web;
+  SettableWeb web;
   const auto journal = std::filesystem::temp_directory_path() / ("kphi_traps_" + std::to_string(getpid()));
   const SettingsKeeper keeper(web.address(), {.rate_hz = 1000, .records_per_datagram = 10}, journal);
   EXPECT_THAT(web.writes(), testing::ElementsAre("/comm.cgi?comrdtrate=1000&comrdtbsiz=10"));
@@ -149,36 +135,31 @@ TEST(Traps, ATimeoutOfAQuarterSecondIsAQuarterSecond) {
   const auto http = SteadyTime::now() - begun;
   EXPECT_GE(http, 249ms);
   EXPECT_LT(http, 10s);
-  FakeWeb page(FakeWeb::page(xml()));
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", 1, page.port()}, clock);
+  Bench bench;
   const auto waiting = SteadyTime::now();
-  EXPECT_FALSE(cell.wait(250ms));
+  EXPECT_FALSE(bench.cell.wait(250ms));
   EXPECT_GE(SteadyTime::now() - waiting, 249ms);
 }
 
 TEST(Traps, NoOldRecordIsGivenAgainWhenNothingComes) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.mute_after_1000 = true});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  cell.start();
+  Bench bench({.mute_after_1000 = true});
+  bench.cell.start();
   std::vector<LoadCellRecord> out(4096);
   std::size_t taken = 0;
   ASSERT_TRUE(soon([&] {
-    taken += cell.take(out);
-    return cell.state() == State::silent;
+    taken += bench.cell.take(out);
+    return bench.cell.state() == State::silent;
   }));
-  taken += cell.take(out);
+  taken += bench.cell.take(out);
   EXPECT_EQ(taken, 1000u);
-  EXPECT_EQ(cell.take(out), 0u);
-  EXPECT_FALSE(cell.wait(0ns));
+  EXPECT_EQ(bench.cell.take(out), 0u);
+  EXPECT_FALSE(bench.cell.wait(0ns));
 }
 
 TEST_F(TrapsOfTheSequence, ALatchedMonitorConditionIsHealthyAndAnErrorIsNoException) {
   Bytes bytes;
-  test::put_record(bytes, 2, 1002, 0x80010000);
-  test::put_record(bytes, 3, 1003, 0xC0000000);
+  put_record(bytes, 2, 1002, 0x80010000);
+  put_record(bytes, 3, 1003, 0xC0000000);
   session.receive(bytes, 1s, out);
   ASSERT_EQ(out.size(), 3u);
   EXPECT_TRUE(healthy(out[1].status));
@@ -186,20 +167,17 @@ TEST_F(TrapsOfTheSequence, ALatchedMonitorConditionIsHealthyAndAnErrorIsNoExcept
 }
 
 TEST(Traps, ALostDatagramNeverHangsTheClient) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.starts_ignored = 1000});
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
-  EXPECT_THROW(cell.start(), DeviceError);
-  EXPECT_FALSE(cell.wait(1ms));
+  Bench bench({.starts_ignored = 1000});
+  EXPECT_THROW(bench.cell.start(), DeviceError);
+  EXPECT_FALSE(bench.cell.wait(1ms));
 }
 
 TEST(Traps, OneReadIsNotOneMessage) {
   std::vector<std::string> byte_by_byte;
-  for (const char byte : xml()) byte_by_byte.push_back(std::string(1, byte));
+  for (const char byte : streaming_xml()) byte_by_byte.push_back(std::string(1, byte));
   byte_by_byte.insert(byte_by_byte.begin(), "HTTP/1.0 200 OK\r\n\r\n");
   FakeWeb web({byte_by_byte});
-  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/netftapi2.xml", 20s), xml());
+  EXPECT_EQ(http_get("127.0.0.1", web.port(), "/netftapi2.xml", 20s), streaming_xml());
   // Of the 16-bit interface: Calinfo.ReadsAnAnswerInPieces. What is cut short is no message:
   const Bytes cut(18, 0x12);
   EXPECT_EQ(decode_calinfo(cut), std::nullopt);
@@ -224,9 +202,7 @@ TEST(Traps, ARecordIsStampedWhenItArrivesAndNotWhenItIsRead) {
 }
 
 TEST(Traps, ASignalExtendsNoTimeout) {
-  FakeWeb web(FakeWeb::page(xml()));
-  const SteadyClock clock;
-  LoadCell cell({"127.0.0.1", 1, web.port()}, clock);
+  Bench bench;
   struct sigaction action {
   }, before{};
   action.sa_handler = [](int) {};
@@ -234,7 +210,7 @@ TEST(Traps, ASignalExtendsNoTimeout) {
   const itimerval every_5_ms{{0, 5000}, {0, 5000}}, never{};
   setitimer(ITIMER_REAL, &every_5_ms, nullptr);
   const auto begun = SteadyTime::now();
-  EXPECT_FALSE(cell.wait(200ms));
+  EXPECT_FALSE(bench.cell.wait(200ms));
   const auto took = SteadyTime::now() - begun;
   setitimer(ITIMER_REAL, &never, nullptr);
   sigaction(SIGALRM, &before, nullptr);
@@ -249,7 +225,7 @@ TEST_F(TrapsOfTheSequence, AStandingMeasurementIsNotDeliveredAsNew) {
 }
 
 TEST(Traps, NothingIsWrittenAndNoStreamIsTakenAtStartUp) {
-  test::SettableWeb web;
+  SettableWeb web;
   FakeBox box({});
   const SteadyClock clock;
   const LoadCell cell({"127.0.0.1", box.port(), web.port()}, clock);
@@ -257,5 +233,4 @@ TEST(Traps, NothingIsWrittenAndNoStreamIsTakenAtStartUp) {
   EXPECT_EQ(box.starts() + box.stops() + box.biases() + box.settings_written(), 0);
 }
 
-}  // namespace traps_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::traps_test

@@ -4,13 +4,13 @@
 #include <algorithm>
 
 #include "drivers/netbox/wire/status.hpp"
-#include "drivers/sim/script/faults.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
+#include "test/drivers/sim/fault_words.hpp"
 
-namespace kphi::netbox::test {
-namespace axia_test {
+namespace kphi::netbox::test::axia_test {
 
 using namespace std::chrono_literals;
+using sim::test::fault_script;
 
 Manner axia(int records_per_datagram = 40) {
   Manner manner;
@@ -26,35 +26,29 @@ std::size_t records_per_datagram(Joined& joined) {
 
 TEST(Axia, MultiBlockBringsTheWholeBufferInEachDatagram) {
   Joined j(axia(), {}, 1);
-  j.run_until(2s);
-  j.finish();
-  EXPECT_EQ(j.disagreement(), "");
+  j.agree_until(2s);
   EXPECT_EQ(records_per_datagram(j), 40u);
   EXPECT_EQ(j.wire().truth().starts, 1u);
 }
 
 TEST(Axia, ABufferOfOneBringsOneRecordInEachDatagram) {
   Joined j(axia(1), {}, 1);
-  j.run_until(2s);
-  j.finish();
-  EXPECT_EQ(j.disagreement(), "");
+  j.agree_until(2s);
   EXPECT_EQ(records_per_datagram(j), 1u);
 }
 
 TEST(Axia, TheNetBoxsBufferedCommandWouldBringNothing) {
-  Manner manner = axia();
   Session wrong{StreamSettings{}};
   wrong.start(0s);
   wrong.advance(1s);
-  Joined j(manner, {}, 1);
+  Joined j(axia(), {}, 1);
   std::array<std::uint8_t, 8> request;
   while (wrong.next_request(request)) j.box().receive(request, 9);
   EXPECT_FALSE(j.box().streaming());
 }
 
 TEST(Axia, ItsSaturationIsReadByItsOwnMap) {
-  const sim::FaultEntry saturation{{"kind", "saturation"}, {"at_s", "1"}, {"for_s", "0.5"}, {"axes", "4"}};
-  Joined j(axia(), {sim::fault_of(saturation)}, 1);
+  Joined j(axia(), fault_script({"saturation at_s=1 for_s=0.5 axes=4"}), 1);
   j.run_until(2s);
   j.finish();
   const auto count = [&](Product product) {
@@ -66,13 +60,9 @@ TEST(Axia, ItsSaturationIsReadByItsOwnMap) {
 }
 
 TEST(Axia, IsStartedAgainLikeANetBox) {
-  const sim::FaultEntry reboot{{"kind", "reboot"}, {"at_s", "2.1"}, {"down_s", "0.2"}};
-  Joined j(axia(), {sim::fault_of(reboot)}, 1);
-  j.run_until(10s);
-  j.finish();
-  EXPECT_EQ(j.disagreement(), "");
+  Joined j(axia(), fault_script({"reboot at_s=2.1 down_s=0.2"}), 1);
+  j.agree_until(10s);
   EXPECT_EQ(j.counters().reboots, 1u);
 }
 
-}  // namespace axia_test
-}  // namespace kphi::netbox::test
+}  // namespace kphi::netbox::test::axia_test

@@ -1,13 +1,11 @@
 // What made other clients of the box lose records, stop or keep silent, each case alone, over real sockets. None of it
 // may cost a record here that is not counted.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "drivers/netbox/receive/load.hpp"
 #include "test/drivers/netbox_faults/live_box.hpp"
 
-namespace kphi::netbox::test {
-namespace cases_others_fail_test {
+namespace kphi::netbox::test::cases_others_fail_test {
 
 using namespace std::chrono_literals;
 using testing::Contains;
@@ -27,17 +25,13 @@ void expect_all_delivered(LoadCell& cell, Consumer& consumer) {
 }
 
 void clean_stream(int records_per_datagram) {
-  LiveBox box({.records_per_datagram = records_per_datagram});
-  const SteadyClock clock;
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(10'500));
-  expect_all_delivered(cell, consumer);
-  EXPECT_EQ(consumer.first_rdt(), 1u);
-  EXPECT_EQ(cell.counters().duplicates, 0u);
-  const sim::WireTruth& truth = box.stop();
-  EXPECT_GE(truth.records_arrived, cell.counters().received);
+  LiveStream s({.records_per_datagram = records_per_datagram});
+  ASSERT_TRUE(s.start_and_take(10'500));
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_EQ(s.consumer.first_rdt(), 1u);
+  EXPECT_EQ(s.cell.counters().duplicates, 0u);
+  const sim::WireTruth& truth = s.box.stop();
+  EXPECT_GE(truth.records_arrived, s.cell.counters().received);
   EXPECT_EQ(truth.starts, 1u);
 }
 
@@ -45,91 +39,69 @@ TEST(CasesOthersFail, ACleanStreamOneByOne) { clean_stream(1); }
 TEST(CasesOthersFail, ACleanStreamOfFortyRecordsPerDatagram) { clean_stream(40); }
 
 TEST(CasesOthersFail, AdjacentSwapsAreNoLoss) {
-  LiveBox box({.rate_hz = 1000,
-               .records_per_datagram = 1,
-               .time_scale = 4,
-               .faults = {{{"kind", "reorder"}, {"at_s", "0"}, {"for_s", "1000"}, {"p", "0.01"}, {"depth", "1"}}}});
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(5000));
-  expect_all_delivered(cell, consumer);
-  EXPECT_GT(cell.counters().reordered, 10u);
+  LiveStream s({.rate_hz = 1000,
+                .records_per_datagram = 1,
+                .time_scale = 4,
+                .faults = {"reorder at_s=0 for_s=1000 p=0.01 depth=1"}});
+  ASSERT_TRUE(s.start_and_take(5000));
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_GT(s.cell.counters().reordered, 10u);
 }
 
 TEST(CasesOthersFail, FiveRecordsPerSecond) {
-  LiveBox box({.rate_hz = 5, .records_per_datagram = 1});
-  const SteadyClock clock;
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(7));
-  EXPECT_EQ(cell.state(), State::streaming);
-  expect_all_delivered(cell, consumer);
-  EXPECT_THAT(cell.take_events(), testing::IsEmpty());
-  EXPECT_EQ(box.stop().starts, 1u) << "it waits instead of asking again";
+  LiveStream s({.rate_hz = 5, .records_per_datagram = 1});
+  ASSERT_TRUE(s.start_and_take(7));
+  EXPECT_EQ(s.cell.state(), State::streaming);
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_THAT(s.cell.take_events(), testing::IsEmpty());
+  EXPECT_EQ(s.box.stop().starts, 1u) << "it waits instead of asking again";
 }
 
 TEST(CasesOthersFail, FiveRecordsPerSecondInBlocksOfForty) {
-  LiveBox box({.rate_hz = 5, .records_per_datagram = 40, .time_scale = 20});
-  const SteadyClock clock(20);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(120));
-  expect_all_delivered(cell, consumer);
-  EXPECT_EQ(box.stop().starts, 1u);
+  LiveStream s({.rate_hz = 5, .records_per_datagram = 40, .time_scale = 20});
+  ASSERT_TRUE(s.start_and_take(120));
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_EQ(s.box.stop().starts, 1u);
 }
 
 /// A consumer that stands still, twice, while so many records come.
 void blocked_consumer(std::uint64_t records) {
-  LiveBox box({.records_per_datagram = 1});
-  const SteadyClock clock;
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
+  LiveStream s({.records_per_datagram = 1});
+  s.cell.start();
   for (std::uint64_t second = 1; second <= 2; ++second) {
-    ASSERT_TRUE(consumer.take_until(second * 3500));
-    const std::uint64_t before = cell.counters().received;
-    ASSERT_TRUE(soon([&] { return cell.counters().received >= before + records; }));
+    ASSERT_TRUE(s.consumer.take_until(second * 3500));
+    const std::uint64_t before = s.cell.counters().received;
+    ASSERT_TRUE(soon([&] { return s.cell.counters().received >= before + records; }));
   }
-  expect_all_delivered(cell, consumer);
-  EXPECT_THAT(cell.take_events(), testing::IsEmpty());
-  EXPECT_EQ(box.stop().starts, 1u) << "no reconnect";
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_THAT(s.cell.take_events(), testing::IsEmpty());
+  EXPECT_EQ(s.box.stop().starts, 1u) << "no reconnect";
 }
 
 TEST(CasesOthersFail, AConsumerBlockedForSixtyMilliseconds) { blocked_consumer(420); }
 TEST(CasesOthersFail, AConsumerBlockedForTwoHundredMilliseconds) { blocked_consumer(1400); }
 
 TEST(CasesOthersFail, AStreamThatBeginsAnewAfterTwoThousandRecords) {
-  LiveBox box({.rate_hz = 1000,
-               .records_per_datagram = 1,
-               .time_scale = 4,
-               .faults = {{{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "2"}}}});
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(4998));
-  EXPECT_THAT(events_until(cell, EventKind::restarted), ElementsAre(EventKind::restarted));
-  expect_all_delivered(cell, consumer);
-  EXPECT_EQ(cell.counters().restarts, 1u);
-  EXPECT_EQ(cell.counters().duplicates, 0u);
-  EXPECT_LT(consumer.last_rdt(), consumer.taken()) << "it counts anew";
+  LiveStream s({.rate_hz = 1000,
+                .records_per_datagram = 1,
+                .time_scale = 4,
+                .faults = {"doubled_start at_s=0 count=1 delay_s=2"}});
+  ASSERT_TRUE(s.start_and_take(4998));
+  EXPECT_THAT(events_until(s.cell, EventKind::restarted), ElementsAre(EventKind::restarted));
+  expect_all_delivered(s.cell, s.consumer);
+  EXPECT_EQ(s.cell.counters().restarts, 1u);
+  EXPECT_EQ(s.cell.counters().duplicates, 0u);
+  EXPECT_LT(s.consumer.last_rdt(), s.consumer.taken()) << "it counts anew";
 }
 
 TEST(CasesOthersFail, ARebootWithTheStreamComingOn) {
-  LiveBox box({.time_scale = 4, .faults = {{{"kind", "reboot"}, {"at_s", "4"}, {"down_s", "0.2"}, {"resume", "1"}}}});
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  ASSERT_TRUE(consumer.take_while([&] { return cell.counters().reboots == 0; }));
-  ASSERT_TRUE(consumer.take_until(consumer.taken() + 2000)) << "records of the new epoch are delivered";
-  EXPECT_THAT(events_until(cell, EventKind::rebooted), Contains(EventKind::rebooted));
-  cell.stop();
-  const Counters counters = cell.counters();
+  LiveStream s({.time_scale = 4, .faults = {"reboot at_s=4 down_s=0.2 resume=1"}});
+  s.cell.start();
+  ASSERT_TRUE(s.consumer.take_while([&] { return s.cell.counters().reboots == 0; }));
+  ASSERT_TRUE(s.consumer.take_until(s.consumer.taken() + 2000)) << "records of the new epoch are delivered";
+  EXPECT_THAT(events_until(s.cell, EventKind::rebooted), Contains(EventKind::rebooted));
+  s.cell.stop();
+  const Counters counters = s.cell.counters();
   EXPECT_EQ(counters.reboots, 1u);
   EXPECT_EQ(counters.restarts, 0u);
   EXPECT_EQ(counters.lost_network + counters.duplicates + counters.late, 0u);
@@ -137,35 +109,28 @@ TEST(CasesOthersFail, ARebootWithTheStreamComingOn) {
 }
 
 TEST(CasesOthersFail, ARebootWithTheStreamStopping) {
-  LiveBox box({.time_scale = 4, .faults = {{{"kind", "reboot"}, {"at_s", "4"}, {"down_s", "0.2"}}}});
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);
-  cell.start();
-  EXPECT_THAT(events_until(cell, EventKind::taken_over), ElementsAre(EventKind::silent, EventKind::taken_over))
+  LiveStream s({.time_scale = 4, .faults = {"reboot at_s=4 down_s=0.2"}});
+  s.cell.start();
+  EXPECT_THAT(events_until(s.cell, EventKind::taken_over), ElementsAre(EventKind::silent, EventKind::taken_over))
       << "the box answers again, and the driver does not fight for what may be another client's stream";
   // Who streams again reads the configuration again.
-  LoadCell anew(box.address(), clock);
+  LoadCell anew(s.box.address(), s.clock);
   Consumer again(anew);
   anew.start();
   ASSERT_TRUE(again.take_until(1000));
   expect_all_delivered(anew, again);
-  cell.stop();
-  const sim::WireTruth& truth = box.stop();
+  s.cell.stop();
+  const sim::WireTruth& truth = s.box.stop();
   EXPECT_EQ(truth.reboots, 1u);
   EXPECT_EQ(truth.starts, 2u);
 }
 
 /// A functor that cannot be copied is called in address, and keeps its state.
 TEST(CasesOthersFail, AConsumerWithAStateIsNeverCopied) {
-  LiveBox box({.time_scale = 4});
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  Consumer consumer(cell);  // neither copyable nor movable: it compiles, so nobody copies it
+  LiveStream s({.time_scale = 4});
   static_assert(!std::is_copy_constructible_v<Consumer> && !std::is_move_constructible_v<Consumer>);
-  cell.start();
-  ASSERT_TRUE(consumer.take_until(2000));
-  expect_all_delivered(cell, consumer);
+  ASSERT_TRUE(s.start_and_take(2000));
+  expect_all_delivered(s.cell, s.consumer);
 }
 
 /// Of the next `records`; N.
@@ -180,31 +145,25 @@ double mean_thrust(LoadCell& cell, std::uint64_t records) {
 }
 
 void bias(bool stops_stream) {
-  LiveBox::Manner manner;
-  manner.time_scale = 4;
-  manner.quirks.bias_stops_stream = stops_stream;
-  LiveBox box(manner);
-  const SteadyClock clock(4);
-  LoadCell cell(box.address(), clock);
-  cell.start();
-  EXPECT_GT(std::abs(mean_thrust(cell, 2000)), 0.05) << "there was something to take away";
+  LiveStream s({.time_scale = 4, .quirks = {.bias_stops_stream = stops_stream}});
+  s.cell.start();
+  EXPECT_GT(std::abs(mean_thrust(s.cell, 2000)), 0.05) << "there was something to take away";
   // The box takes one noisy sample as its zero: what remains is its noise, and after a bad one kphi asks again.
   std::uint64_t asked = 0;
   ASSERT_TRUE(soon([&] {
-    const std::uint64_t starts = cell.counters().restarts;
-    cell.set_bias();
+    const std::uint64_t starts = s.cell.counters().restarts;
+    s.cell.set_bias();
     ++asked;
-    if (stops_stream && !soon([&] { return cell.counters().restarts > starts; })) return true;
-    return std::abs(mean_thrust(cell, 2000)) < 0.05;
+    if (stops_stream && !soon([&] { return s.cell.counters().restarts > starts; })) return true;
+    return std::abs(mean_thrust(s.cell, 2000)) < 0.05;
   }));
-  cell.stop();
-  EXPECT_EQ(cell.counters().lost_network + cell.counters().lost_host == 0, !stops_stream);
-  EXPECT_EQ(cell.counters().restarts, stops_stream ? asked : 0u);
-  EXPECT_EQ(box.stop().starts, 1 + (stops_stream ? asked : 0u));
+  s.cell.stop();
+  EXPECT_EQ(s.cell.counters().lost_network + s.cell.counters().lost_host == 0, !stops_stream);
+  EXPECT_EQ(s.cell.counters().restarts, stops_stream ? asked : 0u);
+  EXPECT_EQ(s.box.stop().starts, 1 + (stops_stream ? asked : 0u));
 }
 
 TEST(CasesOthersFail, ABiasOnABoxThatKeepsStreaming) { bias(false); }
 TEST(CasesOthersFail, ABiasOnABoxThatStopsItsStream) { bias(true); }
 
-}  // namespace cases_others_fail_test
-}  // namespace kphi::netbox::test
+}  // namespace kphi::netbox::test::cases_others_fail_test

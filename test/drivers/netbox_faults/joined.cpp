@@ -1,6 +1,7 @@
 #include "test/drivers/netbox_faults/joined.hpp"
 
 #include <fmt/format.h>
+#include <gtest/gtest.h>
 
 #include <algorithm>
 
@@ -79,6 +80,12 @@ void Joined::pump(Instant now) {
 }
 
 void Joined::finish() { session_.flush(out_); }
+
+void Joined::agree_until(Instant end) {
+  run_until(end);
+  finish();
+  EXPECT_EQ(disagreement(), "");
+}
 
 Ideal Joined::ideal() const {
   return ideal_of(wire_.truth(), arrivals_, static_cast<std::uint32_t>(manner_.divisor),

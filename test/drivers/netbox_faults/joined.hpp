@@ -28,6 +28,8 @@ class Joined {
   void run_box_alone_until(Instant end);
   /// Delivers what waits, so that the account is complete.
   void finish();
+  /// Both, and expects that driver and truth agree.
+  void agree_until(Instant end);
   [[nodiscard]] Ideal ideal() const;
   /// Everything that differs between driver and truth; empty when they agree.
   [[nodiscard]] std::string disagreement() const;

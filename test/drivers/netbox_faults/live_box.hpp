@@ -2,13 +2,13 @@
 #pragma once
 
 #include <chrono>
-#include <initializer_list>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/sim/bench_server.hpp"
+#include "test/drivers/sim/fault_words.hpp"
 #include "test/soon.hpp"
 #include "test/temporary_folder.hpp"
 
@@ -25,7 +25,7 @@ class LiveBox {
     double rate_hz = 7000;
     int records_per_datagram = 40;
     double time_scale = 1;
-    std::vector<sim::FaultEntry> faults = {};
+    std::vector<std::string> faults = {};  ///< "loss at_s=1 for_s=2 p=0.1"
     sim::NetBoxQuirks quirks = {};
   };
 
@@ -52,7 +52,7 @@ class LiveBox {
     settings.bench.netbox.rate_hz = manner.rate_hz;
     settings.bench.netbox.records_per_datagram = manner.records_per_datagram;
     settings.bench.netbox.quirks = manner.quirks;
-    for (const sim::FaultEntry& entry : manner.faults) settings.bench.faults.push_back(sim::fault_of(entry));
+    settings.bench.faults = sim::test::fault_script(manner.faults);
     settings.bench.keep = sim::FaultInjector::Keep::samples;
     settings.control = (folder_.path() / "control").string();
     return settings;
@@ -114,6 +114,22 @@ class Consumer {
   std::uint64_t taken_ = 0, out_of_order_ = 0, samples_missing_ = 0;
   std::uint32_t first_rdt_ = 0;
   LoadCellRecord last_;
+};
+
+/// A box, the driver at its speed, and its consumer.
+struct LiveStream {
+  explicit LiveStream(const LiveBox::Manner& manner)
+      : box(manner), clock(manner.time_scale), cell(box.address(), clock), consumer(cell) {}
+
+  /// False when they do not come in time.
+  bool start_and_take(std::uint64_t records) {
+    cell.start();
+    return consumer.take_until(records);
+  }
+  LiveBox box;
+  const SteadyClock clock;
+  LoadCell cell;
+  Consumer consumer;
 };
 
 /// Kinds of the events until one of `last` comes, that one included; all so far when it does not come in time.

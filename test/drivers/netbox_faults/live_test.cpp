@@ -1,53 +1,27 @@
 // The load cell against the simulator's server, both on their true transports: what a virtual wire cannot show, because
 // HTTP has a part in it.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <optional>
-#include <thread>
 
 #include "drivers/netbox/configuration/http.hpp"
 #include "drivers/netbox/configuration/settings.hpp"
-#include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/netbox/receive/probe.hpp"
-#include "drivers/sim/bench_server.hpp"
+#include "test/drivers/netbox_faults/live_box.hpp"
 
-namespace kphi::netbox::test {
-namespace live_test {
+namespace kphi::netbox::test::live_test {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr auto kPatience = 30s;
-
-sim::Fault fault(const sim::FaultEntry& entry) { return sim::fault_of(entry); }
-
 class Live : public testing::Test {
  protected:
-  ~Live() override { stop(); }
-
-  void start(sim::FaultScript faults, const sim::NetBoxSettings& box = {}) {
-    sim::ServerSettings settings;
-    settings.bench.netbox = box;
-    settings.bench.faults = std::move(faults);
-    settings.control =
-        (std::filesystem::temp_directory_path() / ("kphi_live_" + std::to_string(getpid()) + ".control")).string();
-    server.emplace(settings);
-    thread = std::thread([this] { server->run(); });
+  void start(const std::vector<std::string>& faults, const sim::NetBoxQuirks& quirks = {}) {
+    box.emplace(LiveBox::Manner{.faults = faults, .quirks = quirks});
   }
-  void stop() {
-    if (!thread.joinable()) return;
-    server->request_stop();
-    thread.join();
-  }
-  [[nodiscard]] Address address() const {
-    const sim::Addresses& at = server->addresses();
-    return {at.host, at.rdt_port, at.http_port};
-  }
+  [[nodiscard]] Address address() const { return box->address(); }
   /// Takes records and events until `enough` or the patience is over.
   template <class Enough>
   bool follow(LoadCell& cell, Enough enough) {
@@ -72,15 +46,13 @@ class Live : public testing::Test {
   static void expect_closed(const Counters& c) { EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host); }
 
   const SteadyClock clock;
-  std::optional<sim::Server> server;
-  std::thread thread;
+  std::optional<LiveBox> box;
   std::uint64_t taken = 0;
   std::vector<Event> events;
 };
 
 TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadAgain) {
-  start({fault({{"kind", "reboot"}, {"at_s", "1.5"}, {"down_s", "1.2"}}),
-         fault({{"kind", "http_refused"}, {"at_s", "1.5"}, {"for_s", "1.2"}})});
+  start({"reboot at_s=1.5 down_s=1.2", "http_refused at_s=1.5 for_s=1.2"});
   LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::reconnected) && cell.state() == State::streaming; }))
@@ -96,7 +68,7 @@ TEST_F(Live, ABoxThatBootsAndDoesNotStreamIsStartedAgainAndItsConfigurationReadA
 }
 
 TEST_F(Live, AStreamTakenOverIsReportedAndNotFoughtFor) {
-  start({fault({{"kind", "taken_over"}, {"at_s", "1"}})});
+  start({"taken_over at_s=1"});
   LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::taken_over); }));
@@ -105,13 +77,11 @@ TEST_F(Live, AStreamTakenOverIsReportedAndNotFoughtFor) {
   EXPECT_TRUE(follow(cell, [&] { return std::chrono::steady_clock::now() > until; }));
   EXPECT_EQ(cell.state(), State::silent);
   EXPECT_THAT(kinds(), testing::ElementsAre(EventKind::silent, EventKind::taken_over));
-  stop();
-  EXPECT_EQ(server->truth().starts, 1u);
+  EXPECT_EQ(box->stop().starts, 1u);
 }
 
 TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
-  start({fault({{"kind", "units"}, {"at_s", "1"}, {"force_unit", "1"}, {"torque_unit", "3"}}),
-         fault({{"kind", "reboot"}, {"at_s", "1"}, {"down_s", "0.1"}, {"resume", "1"}})});
+  start({"units at_s=1 force_unit=1 torque_unit=3", "reboot at_s=1 down_s=0.1 resume=1"});
   LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return seen(EventKind::configuration_changed); })) << testing::PrintToString(kinds());
@@ -124,11 +94,8 @@ TEST_F(Live, UnitsThatChangeWithABootAreNamedAlthoughTheStreamGoesOn) {
 }
 
 TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
-  sim::NetBoxSettings box;
-  box.quirks.rate_write = sim::NetBoxQuirks::RateWrite::continues;
-  start({fault({{"kind", "reboot"}, {"at_s", "2"}, {"down_s", "1"}}),
-         fault({{"kind", "http_refused"}, {"at_s", "2"}, {"for_s", "1.2"}})},
-        box);
+  start({"reboot at_s=2 down_s=1", "http_refused at_s=2 for_s=1.2"},
+        {.rate_write = sim::NetBoxQuirks::RateWrite::continues});
   LoadCell cell(address(), clock);
   cell.start();
   ASSERT_TRUE(follow(cell, [&] { return taken > 350; }));
@@ -145,9 +112,7 @@ TEST_F(Live, AnotherRateAfterABootIsStreamedByItsOwnCount) {
 }
 
 TEST_F(Live, AnAxiaStreams) {
-  sim::NetBoxSettings axia;
-  axia.quirks.axia = true;
-  start({}, axia);
+  start({}, {.axia = true});
   LoadCell cell(address(), clock);
   EXPECT_EQ(cell.configuration().kind, Product::axia);
   cell.start();
@@ -159,11 +124,9 @@ TEST_F(Live, AnAxiaStreams) {
 }
 
 TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
-  sim::NetBoxSettings axia;
-  axia.quirks.axia = true;
-  start({fault({{"kind", "status"}, {"at_s", "0"}, {"for_s", "60"}, {"bits", "0xC0000000"}})}, axia);
+  start({"status at_s=0 for_s=60 bits=0xC0000000"}, {.axia = true});
   ProbeSettings settings;
-  settings.tcp_port = server->addresses().tcp_port;
+  settings.tcp_port = box->addresses().tcp_port;
   settings.stream = 300ms;
   const Probe found = probe(address(), clock, settings);
   std::string all;
@@ -173,11 +136,9 @@ TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
 }
 
 TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
-  sim::NetBoxSettings box;
-  box.quirks.only_three_writes = true;
-  start({}, box);
-  const std::filesystem::path journal =
-      std::filesystem::temp_directory_path() / ("kphi_live_" + std::to_string(getpid()) + ".journal");
+  start({}, {.only_three_writes = true});
+  const kphi::test::TemporaryFolder folder;
+  const std::filesystem::path journal = folder / "journal";
   for (int round = 0; round < 3; ++round) {
     SettingsKeeper keeper(address(), {.rate_hz = 150, .records_per_datagram = 4, .filter = 5}, journal);
     const Configuration written = LoadCell(address(), clock).configuration();
@@ -193,5 +154,4 @@ TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
   EXPECT_FALSE(std::filesystem::exists(journal));
 }
 
-}  // namespace live_test
-}  // namespace kphi::netbox::test
+}  // namespace kphi::netbox::test::live_test

@@ -10,8 +10,7 @@
 #include "test/dice.hpp"
 #include "test/drivers/netbox_faults/joined.hpp"
 
-namespace kphi::netbox::test {
-namespace mixtures_test {
+namespace kphi::netbox::test::mixtures_test {
 
 using namespace std::chrono_literals;
 using kphi::test::Dice;
@@ -147,5 +146,4 @@ INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, mixtures() / 
 /// again looks like a step forward.
 TEST(Mixture, ABootRightBehindTheWrap) { expect_agreement(4537); }
 
-}  // namespace mixtures_test
-}  // namespace kphi::netbox::test
+}  // namespace kphi::netbox::test::mixtures_test

@@ -42,29 +42,12 @@ class FakeInstrument final : public usb::Transport {
     class_requests.push_back(setup.request);
     std::fill(data.begin(), data.end(), std::uint8_t{0});
     data[0] = 1;
-    switch (setup.request) {
-      case 1:
-      case 3:
-        parts_.clear();
-        queue_.clear();
-        break;
-      case 2:
-      case 4:
-      case 6:
-        if (pending > 0) --pending, data[0] = 2;
-        break;
-      case 5:
-        parts_.clear();
-        queue_.clear();
-        answer_.clear();
-        if (clear_fails) data[0] = 0x80;
-        break;
-      case 7:
-        if (data.size() == 24) data[4] = interface_caps, data[15] = usb488_caps;
-        break;
-      default:
-        break;
-    }
+    const int request = setup.request;
+    if (request == 1 || request == 3 || request == 5) queue_.clear();
+    if ((request == 2 || request == 4 || request == 6) && pending > 0) --pending, data[0] = 2;
+    if (request == 5) answer_.clear();
+    if (request == 5 && clear_fails) data[0] = 0x80;
+    if (request == 7 && data.size() == 24) data[4] = interface_caps, data[15] = usb488_caps;
     return {usb::Outcome::done, data.size()};
   }
 
@@ -103,18 +86,10 @@ class FakeInstrument final : public usb::Transport {
     if (wrong_tags > 0) --wrong_tags, tag = static_cast<std::uint8_t>(tag - 1);
     const std::size_t n = std::min(part, answer_.size());
     const bool end = n == answer_.size();
-    Bytes bytes{2,
-                tag,
-                static_cast<std::uint8_t>(~tag),
-                0,
-                static_cast<std::uint8_t>(n),
-                static_cast<std::uint8_t>(n >> 8),
-                0,
-                0,
-                static_cast<std::uint8_t>(end),
-                0,
-                0,
-                0};
+    Bytes bytes(12);
+    bytes[0] = 2, bytes[1] = tag, bytes[2] = static_cast<std::uint8_t>(~tag);
+    bytes[4] = static_cast<std::uint8_t>(n), bytes[5] = static_cast<std::uint8_t>(n >> 8);
+    bytes[8] = static_cast<std::uint8_t>(end);
     bytes.insert(bytes.end(), answer_.begin(), answer_.begin() + static_cast<std::ptrdiff_t>(n));
     answer_.erase(0, n);
     while (bytes.size() % 4 != 0) bytes.push_back(0);
@@ -130,7 +105,7 @@ class FakeInstrument final : public usb::Transport {
   std::vector<usb::Interface> interfaces_{
       {0, 0xFE, 0x03, 0x01, {{0x82, usb::EndpointKind::bulk, 512}, {0x01, usb::EndpointKind::bulk, 512}}}};
   std::string answer_;
-  std::deque<Bytes> queue_, parts_;
+  std::deque<Bytes> queue_;
 };
 
 }  // namespace kphi::scpi

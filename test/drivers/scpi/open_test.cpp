@@ -45,10 +45,12 @@ TEST(ScpiAddress, OpensASupplyThatOwnsItsLine) {
       std::make_unique<ScpiSupply>(open_line("scpi-tcp:127.0.0.1:" + std::to_string(server.port())), clock);
   EXPECT_EQ(supply->identity().model, "SIM3010");
   EXPECT_FALSE(supply->read().output);
-  (void)supply->apply({Volts(12), Amperes(5), Volts(13), Amperes(6)});
+  const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
+  EXPECT_EQ(supply->apply(limits), limits);
   {
     const supply::PoweredOutput output(*supply);
     EXPECT_DOUBLE_EQ(supply->read().current_a, 2);
+    EXPECT_DOUBLE_EQ(supply->read().power_w(), 24);
   }
   EXPECT_FALSE(instrument.state().output);
 }

@@ -134,15 +134,6 @@ class TcpInstrumentTest : public testing::Test {
   Tcp line{"127.0.0.1", server.port(), 200ms};
 };
 
-TEST_F(TcpInstrumentTest, IsASupply) {
-  ScpiSupply supply(lend(line), clock);
-  instrument.connect_load(6);
-  const supply::Limits limits{Volts(12), Amperes(5), Volts(13.2), Amperes(6)};
-  EXPECT_EQ(supply.apply(limits), limits);
-  const supply::PoweredOutput output(supply);
-  EXPECT_DOUBLE_EQ(supply.read().power_w(), 24);
-}
-
 TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
   sim::ScpiInstrument rigol({"RIGOL TECHNOLOGIES,DP832,DP8A1,1.0", sim::ScpiKind::supply, sim::ScpiFamily::rigol});
   const sim::ScpiTcp other(rigol, faults);
@@ -155,12 +146,6 @@ TEST_F(TcpInstrumentTest, SpeaksTheDialectOfRigol) {
   EXPECT_EQ(supply.read().regulation, SupplyRegulation::constant_current);
   (void)rigol.apply("OUTP:OCP:VAL 4");
   EXPECT_EQ(supply.read().protection, SupplyProtection::over_current);
-}
-
-TEST_F(TcpInstrumentTest, GivesALateAnswerToNobody) {
-  faults.set({{FaultKind::ambient_late, {}, {}, 1, 400ms}});
-  EXPECT_THAT(kphi::refusal([&] { (void)line.query("VOLT? MAX"); }), HasSubstr("no answer in time"));
-  EXPECT_EQ(line.query("CURR? MAX"), "10.000");
 }
 
 TEST_F(TcpInstrumentTest, ConnectsAgainAfterSilenceAndAfterAnEnd) {

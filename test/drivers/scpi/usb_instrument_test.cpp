@@ -94,28 +94,24 @@ TEST_F(UsbInstrumentTest, SurvivesAnEmptyFirstPacket) {
 
 TEST_F(UsbInstrumentTest, GathersPacketsAndParts) {
   Usbtmc line(*device, 500ms);
-  for (const std::uint64_t size : {std::uint64_t{16}, std::uint64_t{64}}) {
+  for (const unsigned size : {16u, 64u}) {
     break_with(FaultKind::usb_packets, 1, {}, size);
     EXPECT_EQ(idn(line), kIdentity) << size;
   }
-  for (const std::uint64_t size : {std::uint64_t{1}, std::uint64_t{7}, std::uint64_t{24}, std::uint64_t{25}}) {
+  for (const unsigned size : {1u, 7u, 24u, 25u}) {
     break_with(FaultKind::usb_parts, 1000, {}, size);
     EXPECT_EQ(idn(line), kIdentity) << size;
   }
 }
 
-TEST_F(UsbInstrumentTest, NeverTakesTheAnswerToAnotherRequest) {
+TEST_F(UsbInstrumentTest, NeverTakesTheAnswerToAnotherRequestAndRecoversFromAStall) {
   Usbtmc line(*device, 500ms);
-  break_with(FaultKind::usb_wrong_tag);
-  EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("another request"));
-  EXPECT_EQ(idn(line), kIdentity);
-}
-
-TEST_F(UsbInstrumentTest, RecoversFromAStall) {
-  Usbtmc line(*device, 500ms);
-  break_with(FaultKind::ambient_stall);
-  EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr("stalled"));
-  EXPECT_EQ(idn(line), kIdentity);
+  for (const auto& [kind, words] :
+       {std::pair{FaultKind::usb_wrong_tag, "another request"}, std::pair{FaultKind::ambient_stall, "stalled"}}) {
+    break_with(kind);
+    EXPECT_THAT(refusal([&] { (void)idn(line); }), HasSubstr(words));
+    EXPECT_EQ(idn(line), kIdentity);
+  }
 }
 
 TEST_F(UsbInstrumentTest, AbortsAfterSilence) {

@@ -28,17 +28,15 @@ TEST_F(UsbtmcTest, ClearsTheInstrumentAndTakesRemoteControl) {
 }
 
 TEST_F(UsbtmcTest, SendsNoRemoteControlToWhomItChokes) {
-  usb.vendor_id = 0xf4ec;
-  Usbtmc siglent(usb);
-  EXPECT_THAT(usb.class_requests, Not(Contains(160)));
-  usb.class_requests.clear();
-  usb.vendor_id = 0x1ab1, usb.product_id = 0x0588;
-  Usbtmc rigol(usb);
-  EXPECT_THAT(usb.class_requests, Not(Contains(160)));
-  usb.class_requests.clear();
-  usb.product_id = 0x0e11;
-  Usbtmc other_rigol(usb);
-  EXPECT_THAT(usb.class_requests, Contains(160));
+  const auto requests = [&](std::uint16_t vendor, std::uint16_t product) {
+    usb.class_requests.clear();
+    usb.vendor_id = vendor, usb.product_id = product;
+    Usbtmc line(usb);
+    return usb.class_requests;
+  };
+  EXPECT_THAT(requests(0xf4ec, 0x5678), Not(Contains(160))) << "Siglent";
+  EXPECT_THAT(requests(0x1ab1, 0x0588), Not(Contains(160))) << "Rigol";
+  EXPECT_THAT(requests(0x1ab1, 0x0e11), Contains(160)) << "another Rigol";
 }
 
 TEST_F(UsbtmcTest, AsksAndAnswers) {

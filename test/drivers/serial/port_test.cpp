@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "test/drivers/serial/pseudo_terminal.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::serial {
 namespace port_test {
@@ -16,12 +17,7 @@ namespace port_test {
 using fake::PseudoTerminal;
 
 std::string refusal(const std::string& device, unsigned baud) {
-  try {
-    Port port(device, baud);
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "";
+  return kphi::refusal([&] { Port port(device, baud); });
 }
 
 TEST(Port, IsRawEightBitsWithoutParityAtTheBaudAskedFor) {

@@ -9,8 +9,7 @@
 #include "drivers/sim/simulated_bench.hpp"
 #include "test/drivers/sim/hex.hpp"
 
-namespace kphi::sim {
-namespace bench_test {
+namespace kphi::sim::bench_test {
 
 using namespace std::chrono_literals;
 using test::bytes;
@@ -146,5 +145,4 @@ TEST(SimulatedBench, TicksAreCheapEnoughForTwentyFiveTimesRealTime) {
   EXPECT_LT(per_tick, 5000);
 }
 
-}  // namespace bench_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::bench_test

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
@@ -12,8 +11,7 @@
 #include "drivers/sim/input_files.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::sim {
-namespace motor_file_test {
+namespace kphi::sim::motor_file_test {
 
 using testing::HasSubstr;
 
@@ -104,5 +102,4 @@ TEST(MotorFile, IsStrictAndSaysWhere) {
     EXPECT_THAT(refusal(kHead + bad), HasSubstr("m.yaml:")) << bad;
 }
 
-}  // namespace motor_file_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::motor_file_test

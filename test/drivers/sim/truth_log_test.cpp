@@ -1,14 +1,12 @@
 #include "drivers/sim/truth_log.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <array>
 
 #include "drivers/sim/iq/frame.hpp"
 
-namespace kphi::sim {
-namespace truth_log_test {
+namespace kphi::sim::truth_log_test {
 
 using testing::HasSubstr;
 using testing::Not;
@@ -59,5 +57,4 @@ TEST_F(MotionLogTest, SeesAModuleThatCoastsUntold) {
   EXPECT_THAT(log_.json_lines(), Not(HasSubstr("\"motion_command\":\"coast\"")));
 }
 
-}  // namespace truth_log_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::truth_log_test

@@ -4,8 +4,7 @@
 
 #include "base/random.hpp"
 
-namespace kphi::sim {
-namespace scpi_instrument_test {
+namespace kphi::sim::scpi_instrument_test {
 
 TEST(SimulatedScpiInstrument, KnowsShortAndLongFormsInAnyCase) {
   ScpiInstrument supply;
@@ -92,5 +91,4 @@ TEST(SimulatedScpiInstrument, AnswersAnythingWithinItsLimits) {
   }
 }
 
-}  // namespace scpi_instrument_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::scpi_instrument_test

@@ -1,12 +1,10 @@
 #include "test/drivers/sim_equipment/usbtmc.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/random.hpp"
 
-namespace kphi::sim {
-namespace usbtmc_test {
+namespace kphi::sim::usbtmc_test {
 
 using namespace std::chrono_literals;
 using Bytes = std::vector<std::uint8_t>;
@@ -159,5 +157,4 @@ TEST_F(SimulatedUsbtmcTest, SurvivesAnyTransfersAndAnswersAgainOnceItIsCleared) 
   }
 }
 
-}  // namespace usbtmc_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::usbtmc_test

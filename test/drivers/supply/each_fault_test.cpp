@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <ostream>
+#include <tuple>
 
 #include "base/error.hpp"
 #include "drivers/supply/modbus_supply.hpp"
@@ -15,6 +16,7 @@ using namespace std::chrono_literals;
 using sim::FaultKind;
 using test::kShort;
 using test::lasting;
+using test::once;
 using test::Over;
 using test::SimulatedSupply;
 using testing::HasSubstr;
@@ -30,13 +32,6 @@ struct Row {
 
 void PrintTo(const Row& row, std::ostream* out) { *out << row.name; }
 
-sim::Fault fault_of(const Row& row) {
-  sim::Fault fault;
-  fault.kind = row.kind;
-  fault.delay = row.delay;
-  return fault;
-}
-
 class SupplyMeets : public testing::TestWithParam<Row> {
  protected:
   SupplyMeets() : supply(simulated.address(GetParam().wire), clock, kShort) {
@@ -48,9 +43,7 @@ class SupplyMeets : public testing::TestWithParam<Row> {
 };
 
 TEST_P(SupplyMeets, OnceAndReadsOn) {
-  sim::Fault fault = fault_of(GetParam());
-  fault.count = 1;
-  simulated.spoil(fault);
+  simulated.spoil(once(GetParam().kind, GetParam().delay));
   const std::uint64_t before = simulated.truth().requests;
   EXPECT_EQ(supply.read().set_voltage_v, 12);
   EXPECT_EQ(simulated.truth().faults, 1u);
@@ -64,9 +57,7 @@ TEST_P(SupplyMeets, OnceAndReadsOn) {
 }
 
 TEST_P(SupplyMeets, ForEverAndSaysSo) {
-  sim::Fault fault = fault_of(GetParam());
-  fault.lasts = 1h;
-  simulated.spoil(fault);
+  simulated.spoil({.kind = GetParam().kind, .lasts = 1h, .delay = GetParam().delay});
   if (GetParam().words == nullptr) {
     EXPECT_EQ(supply.read().set_voltage_v, 12);
     return;
@@ -76,44 +67,40 @@ TEST_P(SupplyMeets, ForEverAndSaysSo) {
 }
 
 constexpr Duration kNone{0};
-INSTANTIATE_TEST_SUITE_P(
-    Faults, SupplyMeets,
-    testing::Values(Row{"BadCrc", Over::rtu, FaultKind::supply_bad_crc, kNone, "Invalid CRC"},
-                    Row{"NoReply", Over::rtu, FaultKind::supply_no_reply, kNone, "no answer"},
-                    Row{"Deaf", Over::rtu, FaultKind::supply_deaf, kNone, "no answer"},
-                    Row{"Truncated", Over::rtu, FaultKind::supply_truncated, kNone, "no answer"},
-                    Row{"Dribble", Over::rtu, FaultKind::supply_dribble, 300us, nullptr},
-                    Row{"Garbage", Over::rtu, FaultKind::supply_garbage, kNone, "damaged answer"},
-                    Row{"WrongSlave", Over::rtu, FaultKind::supply_wrong_slave, kNone, "damaged answer"},
-                    Row{"Echo", Over::rtu, FaultKind::supply_echo, kNone, "damaged answer"},
-                    Row{"Late", Over::rtu, FaultKind::supply_late, 200ms, "no answer"},
-                    Row{"NoReplyTcp", Over::tcp, FaultKind::supply_no_reply, kNone, "no answer"},
-                    Row{"TruncatedTcp", Over::tcp, FaultKind::supply_truncated, kNone, "no answer"},
-                    Row{"DribbleTcp", Over::tcp, FaultKind::supply_dribble, 300us, nullptr},
-                    Row{"GarbageTcp", Over::tcp, FaultKind::supply_garbage, kNone, ""},
-                    Row{"WrongTransactionTcp", Over::tcp, FaultKind::supply_wrong_transaction, kNone, "damaged answer"},
-                    Row{"LateTcp", Over::tcp, FaultKind::supply_late, 200ms, "no answer"}),
-    [](const auto& row) { return row.param.name; });
+const Row kRows[] = {
+    Row{"BadCrc", Over::rtu, FaultKind::supply_bad_crc, kNone, "Invalid CRC"},
+    Row{"NoReply", Over::rtu, FaultKind::supply_no_reply, kNone, "no answer"},
+    Row{"Deaf", Over::rtu, FaultKind::supply_deaf, kNone, "no answer"},
+    Row{"Truncated", Over::rtu, FaultKind::supply_truncated, kNone, "no answer"},
+    Row{"Dribble", Over::rtu, FaultKind::supply_dribble, 300us, nullptr},
+    Row{"Garbage", Over::rtu, FaultKind::supply_garbage, kNone, "damaged answer"},
+    Row{"WrongSlave", Over::rtu, FaultKind::supply_wrong_slave, kNone, "damaged answer"},
+    Row{"Echo", Over::rtu, FaultKind::supply_echo, kNone, "damaged answer"},
+    Row{"Late", Over::rtu, FaultKind::supply_late, 200ms, "no answer"},
+    Row{"NoReplyTcp", Over::tcp, FaultKind::supply_no_reply, kNone, "no answer"},
+    Row{"TruncatedTcp", Over::tcp, FaultKind::supply_truncated, kNone, "no answer"},
+    Row{"DribbleTcp", Over::tcp, FaultKind::supply_dribble, 300us, nullptr},
+    Row{"GarbageTcp", Over::tcp, FaultKind::supply_garbage, kNone, ""},
+    Row{"WrongTransactionTcp", Over::tcp, FaultKind::supply_wrong_transaction, kNone, "damaged answer"},
+    Row{"LateTcp", Over::tcp, FaultKind::supply_late, 200ms, "no answer"}};
+INSTANTIATE_TEST_SUITE_P(Faults, SupplyMeets, testing::ValuesIn(kRows), [](const auto& row) { return row.param.name; });
 
-TEST(SupplyMeetsAnException, AndDoesNotAskAgain) {
+class OneSupply : public testing::Test {
+ protected:
   SteadyClock clock;
   SimulatedSupply simulated;
-  ModbusSupply supply(simulated.address(), clock, kShort);
+  ModbusSupply supply{simulated.address(), clock, kShort};
+};
+
+TEST_F(OneSupply, MeetsAnExceptionAndDoesNotAskAgain) {
   simulated.spoil(lasting(FaultKind::supply_exception));
   const std::uint64_t before = simulated.truth().requests;
   EXPECT_THROW((void)supply.read(), DeviceError);
   EXPECT_EQ(simulated.truth().requests - before, 1u);
 }
 
-TEST(SupplyMeetsABusyDevice, AndAsksAgain) {
-  SteadyClock clock;
-  SimulatedSupply simulated;
-  ModbusSupply supply(simulated.address(), clock, kShort);
-  sim::Fault busy;
-  busy.kind = FaultKind::supply_exception;
-  busy.code = 6;
-  busy.count = 2;
-  simulated.spoil(busy);
+TEST_F(OneSupply, MeetsABusyDeviceAndAsksAgain) {
+  simulated.spoil({.kind = FaultKind::supply_exception, .count = 2, .code = 6});
   EXPECT_FALSE(supply.read().output);
 }
 
@@ -121,72 +108,44 @@ TEST(SupplyMeetsOneFaultAfterAnother, AndNamesTheFirstFirst) {
   SteadyClock clock;
   SimulatedSupply simulated;
   ModbusSupply supply(simulated.address(Over::tcp), clock, kShort);
-  sim::Fault silent;
-  silent.kind = FaultKind::supply_no_reply;
-  silent.count = 1;
-  simulated.spoil(silent);
+  simulated.spoil(once(FaultKind::supply_no_reply));
   simulated.spoil(lasting(FaultKind::supply_wrong_transaction));
   EXPECT_THAT(
       [&] { (void)supply.read(); },
       ThrowsMessage<DeviceError>(HasSubstr("read: no answer, then damaged answer (Invalid data); check its power")));
 }
 
-struct Lateness {
-  Over wire;
-  Duration after_the_deadline;
-};
-
-void PrintTo(const Lateness& late, std::ostream* out) { *out << late.after_the_deadline.count() / 1'000'000 << "ms"; }
-
 /// The stale answer. The voltage is turned from 12 to 11 V while an answer with 12 is under way: whatever the driver
 /// returns after its deadline must be 11.
-class AStaleAnswer : public testing::TestWithParam<Lateness> {};
+class AStaleAnswer : public testing::TestWithParam<std::tuple<Over, std::chrono::milliseconds>> {};
 
 TEST_P(AStaleAnswer, NeverBecomesAValue) {
+  const auto [wire, late] = GetParam();
   SteadyClock clock;
   SimulatedSupply simulated;
   simulated.inspect([](sim::SupplySlave& slave) { slave.registers().write(8, 1200); });
-  ModbusSupply supply(simulated.address(GetParam().wire), clock, kShort);
+  ModbusSupply supply(simulated.address(wire), clock, kShort);
   ASSERT_EQ(supply.read().set_voltage_v, 12);
-  sim::Fault late;
-  late.kind = FaultKind::supply_late;
-  late.count = 1;
-  late.delay = kShort.answer + GetParam().after_the_deadline;
-  simulated.spoil(late);
-  sim::Fault turned;
-  turned.kind = FaultKind::supply_panel;
-  turned.at = kShort.answer / 2;
-  turned.address = 8;
-  turned.value = 1100;
-  simulated.spoil(turned);
+  simulated.spoil(once(FaultKind::supply_late, kShort.answer + late));
+  simulated.spoil({.kind = FaultKind::supply_panel, .at = kShort.answer / 2, .address = 8, .value = 1100});
   EXPECT_EQ(supply.read().set_voltage_v, 11);
   EXPECT_EQ(supply.read().set_voltage_v, 11);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lateness, AStaleAnswer,
-                         testing::Values(Lateness{Over::rtu, 10ms}, Lateness{Over::rtu, 50ms},
-                                         Lateness{Over::rtu, 90ms}, Lateness{Over::rtu, 140ms},
-                                         Lateness{Over::tcp, 10ms}, Lateness{Over::tcp, 50ms},
-                                         Lateness{Over::tcp, 90ms}, Lateness{Over::tcp, 140ms}));
+INSTANTIATE_TEST_SUITE_P(AfterTheDeadline, AStaleAnswer,
+                         testing::Combine(testing::Values(Over::rtu, Over::tcp),
+                                          testing::Values(10ms, 50ms, 90ms, 140ms)));
 
 /// A line on which everything happens now and then, from a seed: each reading is true or an error, never a wrong value.
 TEST(SupplyOnABadLine, ReadsTheTruthOrNothing) {
   SteadyClock clock;
-  sim::SupplySettings settings;
-  settings.replies_per_s = 0;
-  settings.seed = 7;
-  SimulatedSupply simulated(settings);
+  SimulatedSupply simulated("RD6006", 0, [](sim::SupplySettings& s) { s.seed = 7; });
   ModbusSupply supply(simulated.address(), clock, Timing{40ms, 20ms, 20ms});
   supply.apply({Volts(12), Amperes(2), Volts(13), Amperes(3)});
   for (const FaultKind kind :
        {FaultKind::supply_bad_crc, FaultKind::supply_no_reply, FaultKind::supply_truncated, FaultKind::supply_garbage,
         FaultKind::supply_wrong_slave, FaultKind::supply_echo, FaultKind::supply_late}) {
-    sim::Fault fault;
-    fault.kind = kind;
-    fault.lasts = 1h;
-    fault.p = 0.04;
-    fault.delay = 50ms;
-    simulated.spoil(fault);
+    simulated.spoil({.kind = kind, .lasts = 1h, .delay = 50ms, .p = 0.04});
   }
   int read = 0, failed = 0;
   for (int i = 0; i < 100; ++i) {

@@ -19,15 +19,9 @@ namespace modbus_link_test {
 using namespace std::chrono_literals;
 using sim::FaultKind;
 using test::kShort;
+using test::once;
 
 Address on(const std::string& device) { return parse_address("modbus-rtu:" + device); }
-
-sim::Fault once(FaultKind kind) {
-  sim::Fault fault;
-  fault.kind = kind;
-  fault.count = 1;
-  return fault;
-}
 
 /// Every frame that the sources give for a Riden, byte for byte.
 TEST(ModbusLink, SpeaksTheFramesOfTheRiden) {
@@ -117,19 +111,21 @@ TEST(ModbusLink, NamesWhatIsNoSerialPort) {
   EXPECT_EQ(ModbusLink(on("/dev/null"), {}).open().failure, Failure::lost);
 }
 
-/// The trap that falling silent and the question who answers exist for: without them this is what happens.
-TEST(ModbusLink, WouldTakeALateAnswerForTheAnswerToTheNextRequest) {
+class OnASupply : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(link.open().ok()); }
   test::SimulatedSupply supply;
+  ModbusLink link{supply.address(), kShort};
+  RegisterImage image{};
+};
+
+/// The trap that falling silent and the question who answers exist for: without them this is what happens.
+TEST_F(OnASupply, WouldTakeALateAnswerForTheAnswerToTheNextRequest) {
   supply.inspect([](sim::SupplySlave& slave) {
     slave.registers().write(8, 1200);
     slave.registers().write(9, 5000);
   });
-  ModbusLink link(supply.address(), kShort);
-  ASSERT_TRUE(link.open().ok());
-  auto late = once(FaultKind::supply_late);
-  late.delay = kShort.answer + 50ms;
-  supply.spoil(late);
-  RegisterImage image{};
+  supply.spoil(once(FaultKind::supply_late, kShort.answer + 50ms));
   EXPECT_EQ(link.read({8, 1}, image).failure, Failure::timeout);
   EXPECT_TRUE(link.read({9, 1}, image).ok());
   EXPECT_EQ(image[9], 1200) << "the voltage that was asked for first, in the place of the current";
@@ -140,17 +136,9 @@ TEST(ModbusLink, WouldTakeALateAnswerForTheAnswerToTheNextRequest) {
 }
 
 /// An answer that begins late and takes its time: silence is waited for until its end.
-TEST(ModbusLink, WaitsForTheEndOfALateAnswer) {
-  test::SimulatedSupply supply;
-  ModbusLink link(supply.address(), kShort);
-  ASSERT_TRUE(link.open().ok());
-  auto late = once(FaultKind::supply_late);
-  late.delay = kShort.answer + 30ms;
-  supply.spoil(late);
-  auto dribble = once(FaultKind::supply_dribble);
-  dribble.delay = 5ms;
-  supply.spoil(dribble);
-  RegisterImage image{};
+TEST_F(OnASupply, WaitsForTheEndOfALateAnswer) {
+  supply.spoil(once(FaultKind::supply_late, kShort.answer + 30ms));
+  supply.spoil(once(FaultKind::supply_dribble, 5ms));
   EXPECT_EQ(link.read({8, 13}, image).failure, Failure::timeout);
   link.fall_silent();
   const Outcome settled = link.read({8, 13}, image);
@@ -167,13 +155,9 @@ struct Row {
 void PrintTo(const Row& row, std::ostream* out) { *out << row.name; }
 
 /// The table of faults, as libmodbus 3.1.6 reports each: what the driver is built upon.
-class ModbusLinkMeets : public testing::TestWithParam<Row> {};
+class ModbusLinkMeets : public OnASupply, public testing::WithParamInterface<Row> {};
 
 TEST_P(ModbusLinkMeets, AsLibmodbusReportsIt) {
-  test::SimulatedSupply supply;
-  ModbusLink link(supply.address(), kShort);
-  ASSERT_TRUE(link.open().ok());
-  RegisterImage image{};
   ASSERT_TRUE(link.read({8, 13}, image).ok());
   supply.spoil(GetParam().fault);
   const Outcome spoilt = link.read({8, 13}, image);
@@ -185,29 +169,18 @@ TEST_P(ModbusLinkMeets, AsLibmodbusReportsIt) {
   EXPECT_TRUE(settled.ok()) << settled.words;
 }
 
-sim::Fault once(FaultKind kind, Duration delay) {
-  auto fault = once(kind);
-  fault.delay = delay;
-  return fault;
-}
-
-INSTANTIATE_TEST_SUITE_P(Faults, ModbusLinkMeets,
-                         testing::Values(Row{"bad_crc", once(FaultKind::supply_bad_crc), Failure::damaged, true},
-                                         Row{"no_reply", once(FaultKind::supply_no_reply), Failure::timeout, true},
-                                         Row{"truncated", once(FaultKind::supply_truncated), Failure::timeout, true},
-                                         Row{"dribble", once(FaultKind::supply_dribble, 300us), Failure::none, true},
-                                         Row{"garbage", once(FaultKind::supply_garbage), Failure::damaged, false},
-                                         Row{"wrong_slave", once(FaultKind::supply_wrong_slave), Failure::damaged,
-                                             true},
-                                         Row{"echo", once(FaultKind::supply_echo), Failure::damaged, false},
-                                         Row{"exception", once(FaultKind::supply_exception), Failure::refused, true}),
+const Row kRows[] = {Row{"bad_crc", once(FaultKind::supply_bad_crc), Failure::damaged, true},
+                     Row{"no_reply", once(FaultKind::supply_no_reply), Failure::timeout, true},
+                     Row{"truncated", once(FaultKind::supply_truncated), Failure::timeout, true},
+                     Row{"dribble", once(FaultKind::supply_dribble, 300us), Failure::none, true},
+                     Row{"garbage", once(FaultKind::supply_garbage), Failure::damaged, false},
+                     Row{"wrong_slave", once(FaultKind::supply_wrong_slave), Failure::damaged, true},
+                     Row{"echo", once(FaultKind::supply_echo), Failure::damaged, false},
+                     Row{"exception", once(FaultKind::supply_exception), Failure::refused, true}};
+INSTANTIATE_TEST_SUITE_P(Faults, ModbusLinkMeets, testing::ValuesIn(kRows),
                          [](const auto& row) { return row.param.name; });
 
-TEST(ModbusLink, NeverSendsARequestForTooMany) {
-  test::SimulatedSupply supply;
-  ModbusLink link(supply.address(), kShort);
-  ASSERT_TRUE(link.open().ok());
-  RegisterImage image{};
+TEST_F(OnASupply, NeverSendsARequestForTooMany) {
   EXPECT_EQ(link.read({0, 126}, image).failure, Failure::refused);
   EXPECT_EQ(supply.truth().requests, 0u);
   EXPECT_THROW((void)link.read({120, 9}, image), std::logic_error);
@@ -219,10 +192,7 @@ TEST(ModbusLink, NoticesTheClosedPortAtOnce) {
   ASSERT_TRUE(link.open().ok());
   RegisterImage image{};
   ASSERT_TRUE(link.read({8, 13}, image).ok());
-  sim::Fault closed;
-  closed.kind = FaultKind::supply_closed;
-  closed.lasts = 1h;
-  supply.spoil(closed);
+  supply.spoil(test::lasting(FaultKind::supply_closed));
   EXPECT_TRUE(test::soon([&] { return link.read({8, 13}, image).failure == Failure::lost; }));
 }
 

@@ -19,21 +19,24 @@ using namespace std::chrono_literals;
 using sim::FaultKind;
 using test::kShort;
 using test::lasting;
+using test::once;
 using test::Over;
 using test::SimulatedSupply;
 using test::soon;
+using test::what_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
 const Limits kTwelveVolts{Volts(12), Amperes(2.5), Volts(13), Amperes(3)};
 
-std::string what_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
+void expect_held(SimulatedSupply& supply, const Limits& limits) {
+  supply.inspect([&](sim::SupplySlave& slave) {
+    const sim::SupplyControls& controls = slave.circuit().controls();
+    EXPECT_NEAR(controls.volts, limits.voltage.value(), 1e-9);
+    EXPECT_NEAR(controls.amps, limits.current.value(), 1e-9);
+    EXPECT_NEAR(controls.over_volts, limits.over_voltage.value(), 1e-9);
+    EXPECT_NEAR(controls.over_amps, limits.over_current.value(), 1e-9);
+  });
 }
 
 /// Every model, on both wires.
@@ -58,13 +61,7 @@ TEST_P(EverySupply, IsSetInItsOwnScale) {
   const Limits applied = supply.apply(kTwelveVolts);
   EXPECT_DOUBLE_EQ(applied.voltage.value(), 12);
   EXPECT_DOUBLE_EQ(applied.over_current.value(), 3);
-  simulated.inspect([](sim::SupplySlave& slave) {
-    const sim::SupplyControls& controls = slave.circuit().controls();
-    EXPECT_NEAR(controls.volts, 12, 1e-9);
-    EXPECT_NEAR(controls.amps, 2.5, 1e-9);
-    EXPECT_NEAR(controls.over_volts, 13, 1e-9);
-    EXPECT_NEAR(controls.over_amps, 3, 1e-9);
-  });
+  expect_held(simulated, kTwelveVolts);
 }
 
 TEST_P(EverySupply, ReadsWhatIsAtItsTerminals) {
@@ -210,22 +207,16 @@ TEST_F(OpenRiden, IsTriedAtMostThreeTimes) {
   EXPECT_EQ(simulated.truth().requests - before, 3u);
 }
 
-TEST_F(Riden, SilentFromTheBeginningIsNamed) {
+TEST_F(Riden, SilentAbsentOrOfAnotherModelIsNamed) {
+  const auto refusal = [&](const Address& address) { return what_of([&] { ModbusSupply(address, clock, kShort); }); };
   serial::fake::PseudoTerminal line;
-  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-rtu:" + line.name()), clock, kShort); }),
+  EXPECT_THAT(refusal(parse_address("modbus-rtu:" + line.name())),
               AllOf(HasSubstr("supply on " + line.name()), HasSubstr("no answer"), HasSubstr("its baud rate")));
-}
-
-TEST_F(Riden, AbsentIsNamed) {
-  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-rtu:/dev/no-such-port"), clock, kShort); }),
+  EXPECT_THAT(refusal(parse_address("modbus-rtu:/dev/no-such-port")),
               AllOf(HasSubstr("No such file or directory"), HasSubstr("plug")));
-  EXPECT_THAT(what_of([&] { ModbusSupply(parse_address("modbus-tcp:127.0.0.1:1"), clock, kShort); }),
+  EXPECT_THAT(refusal(parse_address("modbus-tcp:127.0.0.1:1")),
               AllOf(HasSubstr("127.0.0.1:1"), HasSubstr("check host, port and network")));
-}
-
-TEST_F(Riden, OfAnotherModelThanNamedIsRefused) {
-  EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(Over::rtu, "?model=RD6012"), clock, kShort); }),
-              HasSubstr("found a RD6006, not a RD6012"));
+  EXPECT_THAT(refusal(simulated.address(Over::rtu, "?model=RD6012")), HasSubstr("found a RD6006, not a RD6012"));
 }
 
 TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
@@ -238,10 +229,7 @@ TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
 TEST_F(OpenRiden, ReplacedByAnotherIsNoticed) {
   simulated.spoil(lasting(FaultKind::supply_reads_as, 2, 4712));
   EXPECT_TRUE(supply.read().time_ns > 0) << "nothing has given rise to the question";
-  sim::Fault lost;
-  lost.kind = FaultKind::supply_no_reply;
-  lost.count = 1;
-  simulated.spoil(lost);
+  simulated.spoil(once(FaultKind::supply_no_reply));
   EXPECT_THAT(what_of([&] { (void)supply.read(); }), HasSubstr("another device answers"));
 }
 
@@ -266,19 +254,13 @@ TEST_F(OpenRiden, HasItsOwnThresholdsAfterAPresetWasRecalled) {
   supply.apply(kTwelveVolts);
   simulated.inspect([](sim::SupplySlave& slave) { slave.registers().write(19, 3); });
   supply.apply(kTwelveVolts);
-  simulated.inspect([](sim::SupplySlave& slave) {
-    EXPECT_NEAR(slave.circuit().controls().over_volts, 13, 1e-9);
-    EXPECT_NEAR(slave.circuit().controls().over_amps, 3, 1e-9);
-  });
+  expect_held(simulated, kTwelveVolts);
 }
 
 TEST_F(Riden, ComesBackAfterItWasUnpluggedAndPluggedInAgain) {
   for (const Over wire : {Over::rtu, Over::tcp}) {
     ModbusSupply supply(simulated.address(wire), clock, kShort);
-    sim::Fault closed;
-    closed.kind = FaultKind::supply_closed;
-    closed.lasts = 100ms;
-    simulated.spoil(closed);
+    simulated.spoil({.kind = FaultKind::supply_closed, .lasts = 100ms});
     EXPECT_TRUE(soon([&] { return what_of([&] { (void)supply.read(); }) != "nothing was thrown"; }));
     EXPECT_TRUE(soon([&] { return what_of([&] { (void)supply.read(); }) == "nothing was thrown"; }));
   }
@@ -299,11 +281,7 @@ TEST(RidenWithTwoRanges, CountsByItsRangeRegister) {
 
 TEST(HanmatekThresholds, InThreeDecimalsTripTooEarlyNeverTooLate) {
   SteadyClock clock;
-  sim::SupplySettings settings;
-  settings.model = "HM310P";
-  settings.replies_per_s = 0;
-  settings.over_current_in_milliamps = true;
-  SimulatedSupply simulated(settings);
+  SimulatedSupply simulated("HM310P", 0, [](sim::SupplySettings& s) { s.over_current_in_milliamps = true; });
   ModbusSupply supply(simulated.address(), clock, kShort);
   supply.apply(kTwelveVolts);
   simulated.inspect([](sim::SupplySlave& slave) { EXPECT_LE(slave.circuit().controls().over_amps, 3); });
@@ -314,14 +292,8 @@ TEST(RidenDisputes, DoNotTouchAReading) {
   SteadyClock clock;
   for (const auto value : std::array<std::uint16_t, 3>{0, 1, 0xFFFF}) {
     SimulatedSupply simulated("RD6006P");
-    for (const auto at : std::array<std::uint16_t, 3>{12, 13, 19}) {
-      sim::Fault disputed;
-      disputed.kind = FaultKind::supply_reads_as;
-      disputed.lasts = std::chrono::hours(1);
-      disputed.address = at;
-      disputed.value = value;
-      simulated.spoil(disputed);
-    }
+    for (const auto at : std::array<std::uint16_t, 3>{12, 13, 19})
+      simulated.spoil(lasting(FaultKind::supply_reads_as, at, value));
     ModbusSupply supply(simulated.address(), clock, kShort);
     supply.apply(kTwelveVolts);
     PoweredOutput on(supply);
@@ -343,12 +315,7 @@ TEST(RandomSettings, ArriveAsTheNearestStep) {
       const Limits applied = supply.apply(wanted);
       EXPECT_NEAR(applied.voltage.value(), wanted.voltage.value(), 0.5001 / model.counts_per_v);
       EXPECT_NEAR(applied.current.value(), wanted.current.value(), 0.5001 / model.ranges[0].counts_per_a);
-      simulated.inspect([&](sim::SupplySlave& slave) {
-        EXPECT_NEAR(slave.circuit().controls().volts, applied.voltage.value(), 1e-9);
-        EXPECT_NEAR(slave.circuit().controls().amps, applied.current.value(), 1e-9);
-        EXPECT_NEAR(slave.circuit().controls().over_volts, applied.over_voltage.value(), 1e-9);
-        EXPECT_NEAR(slave.circuit().controls().over_amps, applied.over_current.value(), 1e-9);
-      });
+      expect_held(simulated, applied);
     }
   }
 }

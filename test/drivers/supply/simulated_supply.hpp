@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -26,25 +27,27 @@ enum class Over { rtu, tcp };
 
 /// From now on, for an hour; of reads_as: the register and its value.
 inline sim::Fault lasting(sim::FaultKind kind, std::uint16_t address = 0, std::uint16_t value = 0) {
-  sim::Fault fault;
-  fault.kind = kind;
-  fault.lasts = std::chrono::hours(1);
-  fault.address = address;
-  fault.value = value;
-  return fault;
+  return {.kind = kind, .lasts = std::chrono::hours(1), .address = address, .value = value};
+}
+/// The next time only.
+inline sim::Fault once(sim::FaultKind kind, Duration delay = {}) { return {.kind = kind, .count = 1, .delay = delay}; }
+
+inline std::string what_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "nothing was thrown";
 }
 
 class SimulatedSupply {
  public:
-  explicit SimulatedSupply(const std::string& model = "RD6006", double replies_per_s = 0)
-      : SimulatedSupply([&] {
-          sim::SupplySettings settings;
-          settings.model = model;
-          settings.replies_per_s = replies_per_s;
-          return settings;
-        }()) {}
-  explicit SimulatedSupply(const sim::SupplySettings& supply)
-      : server_({supply, sim::SupplyLoad{0, 0.1}, (folder_.path() / "supply").string(), "127.0.0.1", 0}),
+  explicit SimulatedSupply(
+      const std::string& model = "RD6006", double replies_per_s = 0,
+      void (*change)(sim::SupplySettings&) = [](sim::SupplySettings&) {})
+      : server_({settings(model, replies_per_s, change), sim::SupplyLoad{0, 0.1}, (folder_.path() / "supply").string(),
+                 "127.0.0.1", 0}),
         thread_([this] { server_.run(); }) {}
   ~SimulatedSupply() {
     server_.request_stop();
@@ -86,6 +89,15 @@ class SimulatedSupply {
   }
 
  private:
+  static sim::SupplySettings settings(const std::string& model, double replies_per_s,
+                                      void (*change)(sim::SupplySettings&)) {
+    sim::SupplySettings settings;
+    settings.model = model;
+    settings.replies_per_s = replies_per_s;
+    change(settings);
+    return settings;
+  }
+
   kphi::test::TemporaryFolder folder_;
   sim::SupplyServer server_;
   std::thread thread_;

@@ -7,6 +7,7 @@
 #include <array>
 #include <atomic>
 #include <latch>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 
@@ -21,6 +22,7 @@ using namespace std::chrono_literals;
 using test::kShort;
 using test::lasting;
 using test::soon;
+using test::what_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -70,19 +72,14 @@ class FakeSupply final : public Supply {
 
 std::unique_ptr<Supply> fake(Script& script) { return std::make_unique<FakeSupply>(script); }
 
-std::string what_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
-
-TEST(PoweredOutput, IsOnWhileItLives) {
+class PoweredOutputOf : public testing::Test {
+ protected:
   Script script;
+  FakeSupply supply{script};
+};
+
+TEST_F(PoweredOutputOf, ASupplyIsOnWhileItLives) {
   script.output = false;
-  FakeSupply supply(script);
   {
     PoweredOutput on(supply);
     EXPECT_TRUE(script.output);
@@ -90,9 +87,7 @@ TEST(PoweredOutput, IsOnWhileItLives) {
   EXPECT_FALSE(script.output);
 }
 
-TEST(PoweredOutput, EndsWithAnException) {
-  Script script;
-  FakeSupply supply(script);
+TEST_F(PoweredOutputOf, ASupplyEndsWithAnException) {
   EXPECT_THROW(
       {
         PoweredOutput on(supply);
@@ -102,19 +97,15 @@ TEST(PoweredOutput, EndsWithAnException) {
   EXPECT_FALSE(script.output);
 }
 
-TEST(PoweredOutput, SwitchesOffWhenSwitchingOnWasNotConfirmed) {
-  Script script;
+TEST_F(PoweredOutputOf, ASupplySwitchesOffWhenSwitchingOnWasNotConfirmed) {
   script.on_fails = true;
-  FakeSupply supply(script);
   EXPECT_THROW(PoweredOutput on(supply), DeviceError);
   EXPECT_FALSE(script.output);
   EXPECT_EQ(script.offs, 1);
 }
 
-TEST(PoweredOutput, SwitchesOffOnceAndTellsOfAFailure) {
-  Script script;
+TEST_F(PoweredOutputOf, ASupplySwitchesOffOnceAndTellsOfAFailure) {
   script.off_fails = true;
-  FakeSupply supply(script);
   {
     PoweredOutput on(supply);
     EXPECT_THAT(on.off(), HasSubstr("no answer"));
@@ -122,17 +113,27 @@ TEST(PoweredOutput, SwitchesOffOnceAndTellsOfAFailure) {
   EXPECT_EQ(script.offs, 1);
 }
 
-TEST(SupplyWorker, HandsOutReadingsInOrder) {
-  Script script;
-  SteadyClock clock(100);
-  Worker worker(fake(script), clock, 5);
+/// Takes until there are so many.
+std::vector<SupplyReading> taken(Worker& worker, std::size_t wanted) {
   std::vector<SupplyReading> all;
   EXPECT_TRUE(soon([&] {
     std::array<SupplyReading, 8> some;
     const std::size_t count = worker.take(some);
     all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
-    return all.size() >= 20;
+    return all.size() >= wanted;
   }));
+  return all;
+}
+
+class SupplyWorker : public testing::Test {
+ protected:
+  Script script;
+  SteadyClock clock, fast{100};
+};
+
+TEST_F(SupplyWorker, HandsOutReadingsInOrder) {
+  Worker worker(fake(script), fast, 5);
+  const std::vector<SupplyReading> all = taken(worker, 20);
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(all[i].time_ns, static_cast<std::int64_t>(i) + 1);
   ASSERT_TRUE(worker.newest());
   EXPECT_GE(worker.newest()->time_ns, all.back().time_ns);
@@ -140,10 +141,9 @@ TEST(SupplyWorker, HandsOutReadingsInOrder) {
   EXPECT_EQ(worker.failure(), "");
 }
 
-TEST(SupplyWorker, DropsWhatNobodyTakes) {
-  Script script;
-  SteadyClock clock(1000);
-  Worker worker(fake(script), clock, 100);
+TEST_F(SupplyWorker, DropsWhatNobodyTakes) {
+  SteadyClock fastest(1000);
+  Worker worker(fake(script), fastest, 100);
   EXPECT_TRUE(soon([&] { return script.looks > 4200; }));
   std::vector<SupplyReading> kept(5000);
   ASSERT_GE(worker.take(kept), 4096u);
@@ -151,9 +151,7 @@ TEST(SupplyWorker, DropsWhatNobodyTakes) {
   EXPECT_GT(worker.newest()->time_ns, 4197) << "the newest is known though it was dropped";
 }
 
-TEST(SupplyWorker, SwitchesOffWhenItDies) {
-  Script script;
-  SteadyClock clock;
+TEST_F(SupplyWorker, SwitchesOffWhenItDies) {
   {
     Worker worker(fake(script), clock);
     worker.apply(kTwelveVolts);
@@ -163,16 +161,12 @@ TEST(SupplyWorker, SwitchesOffWhenItDies) {
   EXPECT_FALSE(script.output);
 }
 
-TEST(SupplyWorker, SwitchesOffWhatSomebodyElseHadSwitchedOn) {
-  Script script;
-  SteadyClock clock;
+TEST_F(SupplyWorker, SwitchesOffWhatSomebodyElseHadSwitchedOn) {
   { Worker worker(fake(script), clock); }
   EXPECT_FALSE(script.output);
 }
 
-TEST(SupplyWorker, SwitchesOffWhenItsOwnerThrows) {
-  Script script;
-  SteadyClock clock;
+TEST_F(SupplyWorker, SwitchesOffWhenItsOwnerThrows) {
   EXPECT_THROW(
       {
         Worker worker(fake(script), clock);
@@ -183,25 +177,22 @@ TEST(SupplyWorker, SwitchesOffWhenItsOwnerThrows) {
   EXPECT_FALSE(script.output);
 }
 
-TEST(SupplyWorker, SwitchesOffWhenTheSupplyFailsAndWhateverIsThrownOnItsThread) {
+TEST_F(SupplyWorker, SwitchesOffWhenTheSupplyFailsAndWhateverIsThrownOnItsThread) {
   for (const auto& [fails, failure] :
        {std::pair{&Script::read_fails, "fake supply: read: the line is lost; plug it in"},
         std::pair{&Script::throws_oddly, "an unknown failure"}}) {
-    Script script;
-    SteadyClock clock(100);
-    Worker worker(fake(script), clock);
+    Script failing;
+    Worker worker(fake(failing), fast);
     worker.switch_on();
-    script.*fails = true;
+    failing.*fails = true;
     EXPECT_TRUE(soon([&] { return !worker.alive(); }));
-    EXPECT_FALSE(script.output);
+    EXPECT_FALSE(failing.output);
     EXPECT_EQ(worker.failure(), failure);
   }
 }
 
-TEST(SupplyWorker, SaysThatItCouldNotSwitchOff) {
-  Script script;
-  SteadyClock clock(100);
-  Worker worker(fake(script), clock);
+TEST_F(SupplyWorker, SaysThatItCouldNotSwitchOff) {
+  Worker worker(fake(script), fast);
   worker.switch_on();
   script.off_fails = true;
   script.read_fails = true;
@@ -214,9 +205,7 @@ TEST(SupplyWorker, SaysThatItCouldNotSwitchOff) {
   EXPECT_FALSE(worker.switch_off_and_confirm(10s)) << "at once, since nobody can";
 }
 
-TEST(SupplyWorker, FailsWhenTheOrderToSwitchOffFails) {
-  Script script;
-  SteadyClock clock;
+TEST_F(SupplyWorker, FailsWhenTheOrderToSwitchOffFails) {
   Worker worker(fake(script), clock);
   script.off_fails = true;
   EXPECT_FALSE(worker.switch_off_and_confirm(10s));
@@ -225,10 +214,8 @@ TEST(SupplyWorker, FailsWhenTheOrderToSwitchOffFails) {
   EXPECT_GE(script.offs, 2);
 }
 
-TEST(SupplyWorker, SwitchesOffWhenAskedAndGoesOn) {
-  Script script;
-  SteadyClock clock(100);
-  Worker worker(fake(script), clock);
+TEST_F(SupplyWorker, SwitchesOffWhenAskedAndGoesOn) {
+  Worker worker(fake(script), fast);
   worker.switch_on();
   EXPECT_TRUE(worker.switch_off_and_confirm(10s));
   EXPECT_FALSE(script.output);
@@ -237,28 +224,16 @@ TEST(SupplyWorker, SwitchesOffWhenAskedAndGoesOn) {
   EXPECT_TRUE(script.output);
 }
 
-TEST(SupplyWorker, HandsFailuresToWhoHasAsked) {
-  Script script;
+TEST_F(SupplyWorker, HandsFailuresToWhoHasAsked) {
   script.on_fails = true;
-  SteadyClock clock;
   Worker worker(fake(script), clock);
   EXPECT_THAT(what_of([&] { worker.switch_on(); }), HasSubstr("switch on: no answer"));
   EXPECT_TRUE(worker.alive());
   EXPECT_FALSE(script.output);
 }
 
-TEST(SupplyWorker, TellsUnfitLimitsFromAFailure) {
-  SteadyClock clock;
-  test::SimulatedSupply simulated;
-  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock);
-  EXPECT_THROW(worker.apply({Volts(61), Amperes(1), Volts(13), Amperes(3)}), std::invalid_argument);
-  EXPECT_TRUE(worker.alive());
-}
-
-TEST(SupplyWorker, RefusesOrdersWhenItHasFailed) {
-  Script script;
+TEST_F(SupplyWorker, RefusesOrdersWhenItHasFailed) {
   script.read_fails = true;
-  SteadyClock clock;
   Worker worker(fake(script), clock);
   EXPECT_TRUE(soon([&] { return !worker.alive(); }));
   EXPECT_THAT(what_of([&] { worker.switch_on(); }), HasSubstr("the line is lost"));
@@ -267,12 +242,10 @@ TEST(SupplyWorker, RefusesOrdersWhenItHasFailed) {
 
 /// The supply is in the midst of a look and stays there: everybody else gets through. Who waited for it would wait for
 /// ever.
-TEST(SupplyWorker, LetsNobodyWaitForASlowSupply) {
+TEST_F(SupplyWorker, LetsNobodyWaitForASlowSupply) {
   std::latch inside(1), release(1);
-  Script script;
   script.inside = &inside;
   script.release = &release;
-  SteadyClock clock;
   Worker worker(fake(script), clock);
   inside.wait();
   std::array<SupplyReading, 4> some;
@@ -288,13 +261,11 @@ TEST(SupplyWorker, LetsNobodyWaitForASlowSupply) {
 }
 
 /// While a look goes on, on and off are asked for, in this order: it never goes on.
-TEST(SupplyWorker, LetsOffOverruleAnEarlierOn) {
+TEST_F(SupplyWorker, LetsOffOverruleAnEarlierOn) {
   std::latch inside(1), release(1);
-  Script script;
   script.inside = &inside;
   script.release = &release;
   script.output = false;
-  SteadyClock clock;
   Worker worker(fake(script), clock);
   inside.wait();
   std::string answer;
@@ -315,87 +286,77 @@ TEST(SupplyWorker, LetsOffOverruleAnEarlierOn) {
   }
 }
 
-TEST(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
+class SupplyWorkerOnAWire : public testing::Test {
+ protected:
+  /// At 12 V and on.
+  void start(double hz, double answers_per_s = 0, const Timing& timing = kShort) {
+    simulated.emplace("RD6006", answers_per_s);
+    worker.emplace(std::make_unique<ModbusSupply>(simulated->address(), clock, timing), clock, hz);
+    worker->apply(kTwelveVolts);
+    worker->switch_on();
+  }
   SteadyClock clock;
-  test::SimulatedSupply simulated("RD6006", 10);
-  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock), clock, 5);
-  worker.apply(kTwelveVolts);
-  worker.switch_on();
-  std::vector<SupplyReading> all;
-  EXPECT_TRUE(soon([&] {
-    std::array<SupplyReading, 8> some;
-    const std::size_t count = worker.take(some);
-    all.insert(all.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
-    return all.size() >= 6;
-  }));
+  std::optional<test::SimulatedSupply> simulated;
+  std::optional<Worker> worker;
+};
+
+TEST_F(SupplyWorkerOnAWire, TellsUnfitLimitsFromAFailure) {
+  start(20);
+  EXPECT_THROW(worker->apply({Volts(61), Amperes(1), Volts(13), Amperes(3)}), std::invalid_argument);
+  EXPECT_TRUE(worker->alive());
+}
+
+TEST_F(SupplyWorkerOnAWire, FeedsFromAStockSupplyOfTenAnswersPerSecond) {
+  start(5, 10, {});
+  const std::vector<SupplyReading> all = taken(*worker, 6);
   EXPECT_TRUE(std::is_sorted(all.begin(), all.end(),
                              [](const SupplyReading& a, const SupplyReading& b) { return a.time_ns < b.time_ns; }));
   int settled = 0;
-  for (const auto& frame : simulated.truth().frames) settled += frame[1] == 3 && frame[3] == 0;
+  for (const auto& frame : simulated->truth().frames) settled += frame[1] == 3 && frame[3] == 0;
   EXPECT_EQ(settled, 1) << "nothing was asked twice: who it is was asked at the beginning only";
-  EXPECT_TRUE(worker.switch_off_and_confirm(10s));
-  EXPECT_FALSE(simulated.output());
+  EXPECT_TRUE(worker->switch_off_and_confirm(10s));
+  EXPECT_FALSE(simulated->output());
 }
 
-TEST(SupplyWorkerOnAWire, NamesTheUnpluggedSupplyAndThatItCouldNotSwitchOff) {
-  SteadyClock clock;
-  test::SimulatedSupply simulated;
-  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
-  worker.apply(kTwelveVolts);
-  worker.switch_on();
-  simulated.spoil(lasting(sim::FaultKind::supply_closed));
-  EXPECT_TRUE(soon([&] { return !worker.alive(); }));
-  EXPECT_THAT(worker.failure(),
+TEST_F(SupplyWorkerOnAWire, NamesTheUnpluggedSupplyAndThatItCouldNotSwitchOff) {
+  start(20);
+  simulated->spoil(lasting(sim::FaultKind::supply_closed));
+  EXPECT_TRUE(soon([&] { return !worker->alive(); }));
+  EXPECT_THAT(worker->failure(),
               AllOf(HasSubstr("supply RD6006 on "), HasSubstr("No such file"), HasSubstr("plug"),
                     HasSubstr("switch off"), HasSubstr("its output may be on: switch it off by hand")));
-  EXPECT_TRUE(simulated.output()) << "a cable that is out takes no orders";
+  EXPECT_TRUE(simulated->output()) << "a cable that is out takes no orders";
 }
 
-TEST(SupplyWorkerOnAWire, SwitchesOffASupplyThatIsNotHeardAnyMore) {
-  SteadyClock clock;
-  test::SimulatedSupply simulated;
-  {
-    Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
-    worker.apply(kTwelveVolts);
-    worker.switch_on();
-    simulated.spoil(lasting(sim::FaultKind::supply_no_reply));
-    EXPECT_TRUE(soon([&] { return !worker.alive(); }));
-    EXPECT_THAT(worker.failure(), HasSubstr("its output may be on"));
-  }
-  EXPECT_FALSE(simulated.output()) << "it has heard, though it was not heard";
+TEST_F(SupplyWorkerOnAWire, SwitchesOffASupplyThatIsNotHeardAnyMore) {
+  start(20);
+  simulated->spoil(lasting(sim::FaultKind::supply_no_reply));
+  EXPECT_TRUE(soon([&] { return !worker->alive(); }));
+  EXPECT_THAT(worker->failure(), HasSubstr("its output may be on"));
+  worker.reset();
+  EXPECT_FALSE(simulated->output()) << "it has heard, though it was not heard";
 }
 
-TEST(SupplyWorkerOnAWire, ReportsATripAsAReading) {
-  SteadyClock clock;
-  test::SimulatedSupply simulated;
-  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 20);
-  worker.apply(kTwelveVolts);
-  worker.switch_on();
-  sim::Fault trip;
-  trip.kind = sim::FaultKind::supply_trip;
-  trip.code = 1;
-  simulated.spoil(trip);
+TEST_F(SupplyWorkerOnAWire, ReportsATripAsAReading) {
+  start(20);
+  simulated->spoil({.kind = sim::FaultKind::supply_trip, .code = 1});
   EXPECT_TRUE(soon([&] {
-    const auto newest = worker.newest();
+    const auto newest = worker->newest();
     return newest && newest->protection == SupplyProtection::over_voltage && !newest->output;
   }));
-  EXPECT_TRUE(worker.alive());
-  worker.switch_on();
-  EXPECT_TRUE(simulated.output()) << "a new wish after the trip";
+  EXPECT_TRUE(worker->alive());
+  worker->switch_on();
+  EXPECT_TRUE(simulated->output()) << "a new wish after the trip";
 }
 
 /// The motor is braked and feeds back: the supply cannot take it, the voltage rises, and the threshold ends it.
-TEST(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
-  SteadyClock clock;
-  test::SimulatedSupply simulated;
-  Worker worker(std::make_unique<ModbusSupply>(simulated.address(), clock, kShort), clock, 50);
-  worker.apply(kTwelveVolts);
-  simulated.hang({0.5, 0});
-  worker.switch_on();
-  ASSERT_TRUE(soon([&] { return worker.newest() && worker.newest()->voltage_v > 11.9; }));
-  simulated.hang({-0.2, 0});
-  EXPECT_TRUE(soon([&] { return worker.newest()->protection == SupplyProtection::over_voltage; }));
-  EXPECT_TRUE(soon([&] { return worker.newest()->current_a < 0.01; }));
+TEST_F(SupplyWorkerOnAWire, SeesTheVoltageRiseWhenTheLoadFeedsBack) {
+  start(50);
+  simulated->hang({0.5, 0});
+  ASSERT_TRUE(soon([&] { return worker->newest() && worker->newest()->voltage_v > 11.9; }));
+  simulated->hang({-0.2, 0});
+  EXPECT_TRUE(soon([&] { return worker->newest()->protection == SupplyProtection::over_voltage; }));
+  EXPECT_TRUE(soon([&] { return worker->newest()->current_a < 0.01; }));
 }
 
 }  // namespace worker_test

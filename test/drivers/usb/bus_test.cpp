@@ -64,41 +64,40 @@ class VirtualBusTest : public OnVirtualBus {
         if (candidate.address == address) return candidate;
     throw std::logic_error("no such endpoint");
   }
-  std::string refusal(const Bus& bus, const char* address) {
-    return kphi::refusal([&] { (void)bus.open(UsbAddress::parse(address)); });
+  std::string refusal(const Bus& on, const char* address) {
+    return kphi::refusal([&] { (void)on.open(UsbAddress::parse(address)); });
+  }
+
+  std::unique_ptr<Transport> opened() {
+    wire->plug(1, one);
+    bus = std::make_unique<Bus>();
+    return bus->open(UsbAddress::parse("usb:1209:0001"));
   }
 
   Echo one{"0001"}, two{"0002"};
+  std::unique_ptr<Bus> bus;
 };
 
 TEST_F(VirtualBusTest, IsEmptyWithoutDevices) {
-  const Bus bus;
-  EXPECT_TRUE(bus.list().empty());
-  EXPECT_THAT(refusal(bus, "usb:1209:0001"), HasSubstr("not plugged in"));
+  const Bus empty;
+  EXPECT_TRUE(empty.list().empty());
+  EXPECT_THAT(refusal(empty, "usb:1209:0001"), HasSubstr("not plugged in"));
 }
 
-TEST_F(VirtualBusTest, ListsWhatIsThere) {
+TEST_F(VirtualBusTest, ListsWhatIsThereAndRefusesToGuessBetweenTwoAlike) {
   wire->plug(1, one);
   wire->plug(4, two);
-  const Bus bus;
-  EXPECT_THAT(bus.list(), testing::UnorderedElementsAre(Listing{0x1209, 1, "0001", "1-1", true},
-                                                        Listing{0x1209, 1, "0002", "1-4", true}));
-}
-
-TEST_F(VirtualBusTest, RefusesToGuessBetweenTwoAlike) {
-  wire->plug(1, one);
-  wire->plug(4, two);
-  const Bus bus;
-  EXPECT_THAT(refusal(bus, "usb:1209:0001"),
+  const Bus here;
+  EXPECT_THAT(here.list(), testing::UnorderedElementsAre(Listing{0x1209, 1, "0001", "1-1", true},
+                                                         Listing{0x1209, 1, "0002", "1-4", true}));
+  EXPECT_THAT(refusal(here, "usb:1209:0001"),
               testing::AllOf(HasSubstr("several fit"), HasSubstr("0001"), HasSubstr("0002")));
-  EXPECT_THAT(bus.open(UsbAddress::parse("usb:1209:0001:0002"))->name(), HasSubstr("port 1-4"));
-  EXPECT_THAT(bus.open(UsbAddress::parse("usb:1209:0001@1-1"))->name(), HasSubstr("serial 0001"));
+  EXPECT_THAT(here.open(UsbAddress::parse("usb:1209:0001:0002"))->name(), HasSubstr("port 1-4"));
+  EXPECT_THAT(here.open(UsbAddress::parse("usb:1209:0001@1-1"))->name(), HasSubstr("serial 0001"));
 }
 
 TEST_F(VirtualBusTest, ReadsTheDescriptors) {
-  wire->plug(1, one);
-  const Bus bus;
-  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
+  const auto device = opened();
   ASSERT_EQ(device->interfaces().size(), 2u);
   const Interface& first = device->interfaces()[0];
   EXPECT_EQ(first.class_code, 0xFF);
@@ -113,9 +112,7 @@ TEST_F(VirtualBusTest, ReadsTheDescriptors) {
 }
 
 TEST_F(VirtualBusTest, MovesControlBulkAndInterruptTransfers) {
-  wire->plug(1, one);
-  const Bus bus;
-  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
+  const auto device = opened();
   device->claim(0);
   device->claim(1);
   std::array<std::uint8_t, 8> data{};
@@ -136,9 +133,7 @@ TEST_F(VirtualBusTest, MovesControlBulkAndInterruptTransfers) {
 }
 
 TEST_F(VirtualBusTest, ReportsAStallAndClearsIt) {
-  wire->plug(1, one);
-  const Bus bus;
-  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
+  const auto device = opened();
   device->claim(0);
   std::array<std::uint8_t, 8> data{};
   one.halted = true;
@@ -150,18 +145,14 @@ TEST_F(VirtualBusTest, ReportsAStallAndClearsIt) {
 }
 
 TEST_F(VirtualBusTest, GivesUpInTime) {
-  wire->plug(1, one);
-  const Bus bus;
-  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
+  const auto device = opened();
   device->claim(0);
   std::array<std::uint8_t, 8> data{};
   EXPECT_EQ(device->read(endpoint(*device, 0x82), data, 50ms).outcome, Outcome::timed_out);
 }
 
 TEST_F(VirtualBusTest, EndsATransferWhenItsDeviceIsUnplugged) {
-  wire->plug(1, one);
-  const Bus bus;
-  const auto device = bus.open(UsbAddress::parse("usb:1209:0001"));
+  const auto device = opened();
   device->claim(0);
   std::thread reader([&] {
     std::array<std::uint8_t, 8> data{};

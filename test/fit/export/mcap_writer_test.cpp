@@ -1,6 +1,5 @@
 #include "fit/export/mcap_writer.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -5,7 +5,6 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
-#include <pugixml.hpp>
 #include <set>
 #include <sstream>
 
@@ -28,15 +27,19 @@ using ::testing::HasSubstr;
 
 const std::string kPython = "/usr/bin/python3";  // Debian's, which sees Debian's modules
 
-/// A name made to break out of comments and quotes.
-compensation::Coefficients coefficients(const std::string& name = "Tom's \"5x4\" -- */ <b> \\") {
+compensation::Coefficients coefficients() {
   Provenance provenance;
-  provenance.propeller_name = name;
+  provenance.propeller_name = "Tom's \"5x4\" -- */ <b> \\";  // made to break out of comments and quotes
   provenance.tool_version = "0.1.0";
   provenance.measured_utc = "2021-05-30T00:00:00Z";
   provenance.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "", std::nullopt}};
   return compensation::parse_coefficients(format_coefficients(analysed(identify(campaign_steps())), provenance),
                                           "c.yaml");
+}
+
+const compensation::Coefficients& file() {
+  static const compensation::Coefficients kOnce = coefficients();
+  return kOnce;
 }
 
 nlohmann::json yaml_as_json(const std::string& text) {
@@ -57,35 +60,31 @@ class Yaml : public ::testing::Test {
 };
 
 TEST_F(Yaml, OfAgiliciousIsReadByPython) {
-  const auto file = coefficients();
-  const auto map = yaml_as_json(to_agilicious(file, {}).text);
-  EXPECT_EQ(map["thrust_map"][0].get<double>(), file.curve.thrust_coefficient().value())
+  const auto map = yaml_as_json(to_agilicious(file(), {}).text);
+  EXPECT_EQ(map["thrust_map"][0].get<double>(), file().curve.thrust_coefficient().value())
       << "to the last bit, and as a float";
   EXPECT_EQ(map["thrust_map"][1], 0.0);
-  EXPECT_EQ(map["motor_omega_max"].get<double>(), file.fastest_speed->value());
-  const auto covered = yaml_as_json(to_agilicious(file, {.phi_deg = 180}).text);
+  EXPECT_EQ(map["motor_omega_max"].get<double>(), file().fastest_speed->value());
+  const auto covered = yaml_as_json(to_agilicious(file(), {.phi_deg = 180}).text);
   EXPECT_NEAR(covered["thrust_map"][0].get<double>(), CampaignTruth{}.k(180), 5e-9);
 }
 
 TEST_F(Yaml, OfRos2IsReadByPythonWithDoublesAndListsOfOneType) {
-  const auto file = coefficients();
-  const auto all = yaml_as_json(to_ros2(file, {}).text);
-  const auto& parameters = all["/**"]["ros__parameters"]["kphi"];
+  const auto parameters = yaml_as_json(to_ros2(file(), {}).text)["/**"]["ros__parameters"]["kphi"];
   EXPECT_EQ(parameters["propeller"], "5x3");
-  EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file.curve.thrust_coefficient().value());
-  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), compensation::line_of(file.curve).slope_per_rad);
+  EXPECT_EQ(parameters["thrust_coefficient_n_s2_per_rad2"].get<double>(), file().curve.thrust_coefficient().value());
+  EXPECT_EQ(parameters["line_slope_n_s2_per_rad3"].get<double>(), compensation::line_of(file().curve).slope_per_rad);
   ASSERT_EQ(parameters["phi_deg"].size(), 5u);
   for (const auto& [key, value] : parameters.items()) {
     if (key == "propeller" || key == "overlap") continue;
     for (const auto& number : value.is_array() ? value : nlohmann::json::array({value}))
       EXPECT_TRUE(number.is_number_float()) << key << " " << number;
   }
-  EXPECT_THAT(to_ros2(file, {}).lost, Contains(HasSubstr("air_density"))) << "what is unknown is said, not invented";
+  EXPECT_THAT(to_ros2(file(), {}).lost, Contains(HasSubstr("air_density"))) << "what is unknown is said, not invented";
 }
 
 TEST(Px4, ParametersAreForceAtFullOutput) {
-  const auto file = coefficients();
-  const Export result = to_px4(file, {.speed_max_rpm = 20000, .motors = 3});
+  const Export result = to_px4(file(), {.speed_max_rpm = 20000, .motors = 3});
   std::istringstream lines(result.text);
   std::map<std::string, double> values;
   for (std::string line; std::getline(lines, line);) {
@@ -100,33 +99,31 @@ TEST(Px4, ParametersAreForceAtFullOutput) {
   }
   ASSERT_EQ(values.size(), 4u);
   const double full = from_rpm(20000).value();
-  EXPECT_NEAR(values["CA_ROTOR2_CT"], file.curve.thrust_coefficient().value() * full * full, 1e-9);
+  EXPECT_NEAR(values["CA_ROTOR2_CT"], file().curve.thrust_coefficient().value() * full * full, 1e-9);
   EXPECT_EQ(values["THR_MDL_FAC"], 1);
   EXPECT_THAT(result.lost, Contains(HasSubstr("one constant per motor and cannot change it in flight")));
-  EXPECT_THROW((void)to_px4(file, {.speed_max_rpm = 200000}), ConfigurationError) << "above the parameter's range";
+  EXPECT_THROW((void)to_px4(file(), {.speed_max_rpm = 200000}), ConfigurationError) << "above the parameter's range";
 }
 
 TEST(Gazebo, IsReadByXmllint) {
   if (!works("xmllint --version")) GTEST_SKIP() << "apt install libxml2-utils";
   const TemporaryFolder folder;
-  const auto file = coefficients();
   const std::string path = (folder.path() / "motors.sdf").string();
-  test::write_file(path, to_gazebo(file, {}).text);
+  test::write_file(path, to_gazebo(file(), {}).text);
   const auto read = [&](const std::string& xpath) {
     const auto reading = read_with("xmllint --xpath 'string(" + xpath + ")' " + path);
     EXPECT_EQ(reading.status, 0) << reading.out;
     return std::strtod(reading.out.c_str(), nullptr);
   };
-  EXPECT_EQ(read("/sdf/model/plugin[3]/motorConstant"), file.curve.thrust_coefficient().value());
-  EXPECT_EQ(read("/sdf/model/plugin[1]/maxRotVelocity"), file.fastest_speed->value());
+  EXPECT_EQ(read("/sdf/model/plugin[3]/motorConstant"), file().curve.thrust_coefficient().value());
+  EXPECT_EQ(read("/sdf/model/plugin[1]/maxRotVelocity"), file().fastest_speed->value());
   EXPECT_EQ(read("count(//plugin)"), 4);
 }
 
 TEST(Header, IsReadByACompilerAndAgreesWithTheLibraryThatFlies) {
   if (!works("c++ --version")) GTEST_SKIP() << "no compiler";
   const TemporaryFolder folder;
-  const auto file = coefficients();
-  test::write_file(folder.path() / "k.hpp", to_header(file, {}).text);
+  test::write_file(folder.path() / "k.hpp", to_header(file(), {}).text);
   test::write_file(folder.path() / "main.cpp", R"(#include "k.hpp"
 #include <cstdio>
 static_assert(kphi_5x3::scaling_factor(0.0) == 1.0, "");
@@ -143,34 +140,32 @@ int main() {
   ASSERT_EQ(compiled.status, 0) << compiled.out;
   const auto ran = read_with(binary);
   std::istringstream numbers(ran.out);
-  const auto line = file.curve;
   double value = 0;
   for (int degrees = 0; degrees <= 360; degrees += 15) {
     numbers >> value;
-    EXPECT_NEAR(value, line.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
+    EXPECT_NEAR(value, file().curve.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
   }
   numbers >> value;
-  EXPECT_NEAR(value, 5.0 / (file.curve.thrust_coefficient().value() * line.scaling_factor(Radians(1.0))), 1e-6);
+  EXPECT_NEAR(value, 5.0 / (file().curve.thrust_coefficient().value() * file().curve.scaling_factor(Radians(1.0))),
+              1e-6);
 }
 
 TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
-  const auto file = coefficients();
-  const std::string text = to_csv(file, {}).text;
+  const std::string text = to_csv(file(), {}).text;
   ASSERT_TRUE(is_k_table(text));
   const auto points = read_k_table(text, "K.csv");
   ASSERT_EQ(points.size(), 5u);
   const CurveFit line = fit_curve(points);
-  EXPECT_NEAR(line.value("slope_per_deg") / (compensation::line_of(file.curve).slope_per_rad * kPi / 180), 1, 1e-9);
-  EXPECT_EQ(line.K_T, file.curve.thrust_coefficient().value());
+  EXPECT_NEAR(line.value("slope_per_deg") / (compensation::line_of(file().curve).slope_per_rad * kPi / 180), 1, 1e-9);
+  EXPECT_EQ(line.K_T, file().curve.thrust_coefficient().value());
 }
 
 TEST(Targets, SayWhatTheyCannotHold) {
-  const auto file = coefficients();
   std::set<std::string> names;
   for (const Target& target : targets()) {
     SCOPED_TRACE(target.name);
     EXPECT_TRUE(names.insert(target.name).second);
-    const Export result = target.write(file, {});
+    const Export result = target.write(file(), {});
     EXPECT_FALSE(result.text.empty());
     EXPECT_FALSE(result.lost.empty());
     for (const std::string& reason : result.lost) EXPECT_THAT(reason, HasSubstr(": ")) << "what, and why";
@@ -180,16 +175,15 @@ TEST(Targets, SayWhatTheyCannotHold) {
 
 TEST(Targets, RefuseAnOcclusionThatWasNotMeasured) {
   for (const auto write : {to_agilicious, to_px4, to_gazebo}) {
-    EXPECT_THROW((void)write(coefficients(), {.phi_deg = 300}), ConfigurationError);
-    EXPECT_THROW((void)write(coefficients(), {.phi_deg = -1}), ConfigurationError);
+    for (const double phi : {300.0, -1.0}) EXPECT_THROW((void)write(file(), {.phi_deg = phi}), ConfigurationError);
   }
 }
 
 TEST(Targets, ThatNeedASpeedSaySo) {
-  auto file = coefficients();
-  file.fastest_speed.reset();
-  EXPECT_THROW((void)to_px4(file, {}), ConfigurationError);
-  EXPECT_NO_THROW((void)to_agilicious(file, {}));
+  auto bare = file();
+  bare.fastest_speed.reset();
+  EXPECT_THROW((void)to_px4(bare, {}), ConfigurationError);
+  EXPECT_NO_THROW((void)to_agilicious(bare, {}));
 }
 
 }  // namespace targets_test

@@ -16,10 +16,7 @@ using ::testing::HasSubstr;
 TEST(UiucTable, TakesTheDiameterFromTheName) {
   EXPECT_EQ(diameter_from_name("apcff_4.2x4_static_0615rd.txt"), 4.2);
   EXPECT_EQ(diameter_from_name("apcsf_10x7_static_kt0827.txt"), 10);
-  EXPECT_FALSE(diameter_from_name("static.txt"));
-  EXPECT_FALSE(diameter_from_name("xx"));
-  EXPECT_FALSE(diameter_from_name(""));
-  EXPECT_FALSE(diameter_from_name("a_0x3.txt"));
+  for (const char* none : {"static.txt", "xx", "", "a_0x3.txt"}) EXPECT_FALSE(diameter_from_name(none)) << none;
 }
 
 TEST(UiucTable, TurnsTheCoefficientIntoThrust) {
@@ -81,33 +78,16 @@ TEST(Tables, NoMutationOfATableCrashesAReader) {
     for (int i = 0; i < edits && !text.empty(); ++i) {
       const std::size_t at = random() % text.size();
       const char bytes[] = {',', '"', '\n', '\r', ' ', '\0', '-', 'e', '9', static_cast<char>(random())};
-      switch (random() % 4) {
-        case 0:
-          text[at] = bytes[random() % 10];
-          break;
-        case 1:
-          text.insert(at, 1, bytes[random() % 10]);
-          break;
-        case 2:
-          text.erase(at, 1 + random() % 4);
-          break;
-        default:
-          text.insert(at, text.substr(random() % text.size(), random() % 40));
-          break;
-      }
+      const auto edit = random() % 4;
+      if (edit == 0) text[at] = bytes[random() % 10];
+      if (edit == 1) text.insert(at, 1, bytes[random() % 10]);
+      if (edit == 2) text.erase(at, 1 + random() % 4);
+      if (edit == 3) text.insert(at, text.substr(random() % text.size(), random() % 40));
     }
     try {
-      switch (trial % 3) {
-        case 0:
-          accepted += select_rows(read_rcbenchmark(text, "x.csv")).steps.size();
-          break;
-        case 1:
-          accepted += read_uiuc(text, "apc_5x4_x.txt").steps.size();
-          break;
-        default:
-          accepted += read_k_table(text, "K.csv", "N/RPM^2").size();
-          break;
-      }
+      accepted += trial % 3 == 0   ? select_rows(read_rcbenchmark(text, "x.csv")).steps.size()
+                  : trial % 3 == 1 ? read_uiuc(text, "apc_5x4_x.txt").steps.size()
+                                   : read_k_table(text, "K.csv", "N/RPM^2").size();
     } catch (const ConfigurationError&) {
       ++refused;
     }

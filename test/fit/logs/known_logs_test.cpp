@@ -14,6 +14,8 @@
 #include "base/csv.hpp"
 #include "base/error.hpp"
 #include "fit/logs/import_table.hpp"
+#include "fit/model/step_selection.hpp"
+#include "fit/numerics/linear_regression.hpp"
 #include "results/file_layer.hpp"
 #include "test/fit/logs/synthetic_logs.hpp"
 
@@ -30,27 +32,6 @@ const LogFinding* find(const std::vector<LogFinding>& findings, FindingKind kind
 
 // ---- synthetic logs: with the defects of real ones, and a known truth ----------------------------------------
 
-/// Least squares in closed form.
-struct ClosedForm {
-  double k = 0, standard_error = 0, rms = 0, k_with_offset = 0, offset = 0;
-
-  explicit ClosedForm(const std::vector<Point>& points) {
-    double x = 0, xx = 0, t = 0, xt = 0, squares = 0;
-    const double n = static_cast<double>(points.size());
-    for (const Point& point : points) {
-      const double square = point.speed_rad_s * point.speed_rad_s;
-      x += square, xx += square * square, t += point.thrust_n, xt += square * point.thrust_n;
-    }
-    k = xt / xx;
-    for (const Point& point : points)
-      squares += std::pow(point.thrust_n - k * point.speed_rad_s * point.speed_rad_s, 2);
-    rms = std::sqrt(squares / (n - 1));
-    standard_error = rms / std::sqrt(xx);
-    k_with_offset = (n * xt - x * t) / (n * xx - x * x);
-    offset = (t - k_with_offset * x) / n;
-  }
-};
-
 class KnownLogs : public ::testing::TestWithParam<std::size_t> {
  protected:
   const KnownLog log_ = known_logs().at(GetParam());
@@ -62,12 +43,18 @@ TEST_P(KnownLogs, GiveTheFitOfTheRowsThatMustBeTaken) {
   ASSERT_EQ(imported.steps.size(), log_.used.size());
   const ThrustFit origin = fit_thrust(points_of(imported.steps));
   const ThrustFit offset = fit_thrust(points_of(imported.steps), {.form = ThrustForm::with_offset});
-  const ClosedForm known(log_.used);
-  EXPECT_NEAR(origin.parameters.k / known.k, 1, 1e-9);
-  EXPECT_NEAR(origin.rms_n, known.rms, 1e-9);
-  EXPECT_NEAR(origin.standard_error.k, known.standard_error, 1e-9 * known.k);
-  EXPECT_NEAR(offset.parameters.k / known.k_with_offset, 1, 1e-9);
-  EXPECT_NEAR(offset.parameters.offset, known.offset, 1e-7);
+  std::vector<double> squares, thrusts;
+  for (const Point& point : log_.used) {
+    squares.push_back(point.speed_rad_s * point.speed_rad_s);
+    thrusts.push_back(point.thrust_n);
+  }
+  const Regression known = regress_polynomial(squares, thrusts, 1, 1),
+                   line = regress_polynomial(squares, thrusts, 0, 1);
+  EXPECT_NEAR(origin.parameters.k / known.estimates[0], 1, 1e-9);
+  EXPECT_NEAR(origin.rms_n, known.residual_deviation, 1e-9);
+  EXPECT_NEAR(origin.standard_error.k, known.standard_errors[0], 1e-9 * known.estimates[0]);
+  EXPECT_NEAR(offset.parameters.k / line.estimates[1], 1, 1e-9);
+  EXPECT_NEAR(offset.parameters.offset, line.estimates[0], 1e-7);
 }
 
 TEST_P(KnownLogs, HaveTheirKnownDefectsAndNoOthers) {

@@ -50,19 +50,26 @@ StandLog series(unsigned seed = 1) {
   return log;
 }
 
-std::vector<std::string> names(const std::vector<LogFinding>& findings) {
-  std::vector<std::string> result;
+using Names = std::vector<std::string>;
+
+Names names(const std::vector<LogFinding>& findings) {
+  Names result;
   for (const LogFinding& finding : findings) {
     if (finding.kind != FindingKind::negative_thrust) result.push_back(name_of(finding.kind));
   }
   return result;
 }
 
-std::vector<std::string> found(const StandLog& log, const RowSelection& selection = {}) {
-  return names(audit(log, selection));
-}
+Names found(const StandLog& log, const RowSelection& selection = {}) { return names(audit(log, selection)); }
 
-using Names = std::vector<std::string>;
+/// Of each step after an import.
+std::vector<std::uint32_t> flags(const StandLog& log) {
+  ImportedTable table = select_rows(log);
+  flag_steps(table, audit(log, {}));
+  std::vector<std::uint32_t> result;
+  for (const results::StepMean& step : table.steps) result.push_back(step.quality_flags);
+  return result;
+}
 
 TEST(LogAudit, FindsNothingInCleanLogs) {
   EXPECT_EQ(found(sweep()), Names{});
@@ -83,11 +90,8 @@ TEST(LogAudit, NamesThePoleCountBehindARatio) {
 }
 
 TEST(LogAudit, DoesNotInventAPoleCount) {
-  EXPECT_FALSE(pole_ratio(1.0));
-  EXPECT_FALSE(pole_ratio(1.005));
+  for (const double none : {1.0, 1.005, 0.0, -2.0}) EXPECT_FALSE(pole_ratio(none)) << none;
   EXPECT_FALSE(pole_ratio(1.0371)) << "no ratio of small whole numbers within 0.2 %";
-  EXPECT_FALSE(pole_ratio(0));
-  EXPECT_FALSE(pole_ratio(-2));
   EXPECT_EQ(pole_ratio(2.0)->numerator, 2);
 }
 
@@ -97,10 +101,9 @@ TEST(LogAudit, MarksTheStepOfOneBadSpeed) {
   const auto findings = audit(log, {});
   ASSERT_EQ(names(findings), Names{"speed_disagrees"});
   EXPECT_EQ(findings[0].first_line, 8u);
-  ImportedTable table = select_rows(log);
-  flag_steps(table, findings);
-  for (std::size_t i = 0; i < table.steps.size(); ++i)
-    EXPECT_EQ(table.steps[i].quality_flags, i == 6 ? static_cast<std::uint32_t>(QualityFlag::speed_unsteady) : 0u);
+  std::vector<std::uint32_t> expected(log.rows.size());
+  expected[6] = static_cast<std::uint32_t>(QualityFlag::speed_unsteady);
+  EXPECT_EQ(flags(log), expected);
 }
 
 TEST(LogAudit, FindsASensorThatDies) {
@@ -122,18 +125,6 @@ TEST(LogAudit, FindsAOneSampleDoubling) {
   EXPECT_EQ(findings[0].first_line, 202u);
 }
 
-TEST(LogAudit, FindsSpeedsThatAreMissing) {
-  StandLog log = sweep();
-  log.rows[3].electrical_rpm = log.rows[3].optical_rpm = 0;
-  EXPECT_EQ(found(log), Names{"speed_missing"});
-  log = sweep();
-  log.rows[0].electrical_rpm = log.rows[0].optical_rpm = 0;
-  log.rows[0].thrust_n = 0.01;
-  EXPECT_EQ(found(log), Names{"not_turning"});
-  log.rows[0].electrical_rpm = 2;
-  EXPECT_EQ(found(log), Names{"barely_turning"});
-}
-
 TEST(LogAudit, FindsTheCurrentLimit) {
   StandLog log = sweep();
   for (std::size_t i : {10u, 11u}) {
@@ -144,9 +135,7 @@ TEST(LogAudit, FindsTheCurrentLimit) {
   const auto findings = audit(log, {});
   ASSERT_EQ(names(findings), Names{"current_limit"});
   EXPECT_EQ(findings[0].rows, 2u);
-  ImportedTable table = select_rows(log);
-  flag_steps(table, findings);
-  EXPECT_EQ(table.steps[11].quality_flags, static_cast<std::uint32_t>(QualityFlag::supply_out_of_band));
+  EXPECT_EQ(flags(log).at(11), static_cast<std::uint32_t>(QualityFlag::supply_out_of_band));
 }
 
 TEST(LogAudit, FindsAZeroThatIsNone) {
@@ -168,18 +157,9 @@ TEST(LogAudit, FindsAZeroThatIsNone) {
 TEST(LogAudit, FindsAFrozenChannel) {
   StandLog log = series();
   for (std::size_t i = 150; i < 450; ++i) log.rows[i].thrust_n = log.rows[150].thrust_n;
-  const auto findings = audit(log, {});
-  ASSERT_THAT(names(findings), ::testing::Contains("thrust_frozen"));
-  ImportedTable table = select_rows(log);
-  flag_steps(table, findings);
-  EXPECT_EQ(table.steps[200].quality_flags, static_cast<std::uint32_t>(QualityFlag::bad_status));
-  EXPECT_EQ(table.steps[0].quality_flags, 0u);
-}
-
-TEST(LogAudit, FindsThrustThatDriftsAtConstantSpeed) {
-  StandLog log = series();
-  for (std::size_t i = 40; i < 440; ++i) log.rows[i].thrust_n *= 1 - 0.1 * static_cast<double>(i - 40) / 400;
-  EXPECT_THAT(found(log), ::testing::Contains("thrust_drifts"));
+  EXPECT_THAT(found(log), ::testing::Contains("thrust_frozen"));
+  EXPECT_EQ(flags(log).at(200), static_cast<std::uint32_t>(QualityFlag::bad_status));
+  EXPECT_EQ(flags(log)[0], 0u);
 }
 
 TEST(LogAudit, CountsIndependentRows) {
@@ -192,18 +172,6 @@ TEST(LogAudit, CountsIndependentRows) {
   for (double& value : values) value = noise(random);
   EXPECT_NEAR(correlation_time(values), 1, 0.1);
   EXPECT_EQ(correlation_time({1, 1, 1, 1}), 1);
-}
-
-TEST(LogAudit, CountsStampsThatGoBackOrStandTwice) {
-  StandLog log = series();
-  log.rows[100].time_s = *log.rows[99].time_s;
-  log.rows[200].time_s = 0;
-  log.rows[300].time_s = 306;
-  EXPECT_EQ(found(log), (Names{"time_backward", "time_repeated"}));
-  for (const auto& [kind, rows, line, text, lines] : audit(log, {})) {
-    const std::size_t expected = kind == FindingKind::time_backward ? 2 : kind == FindingKind::time_repeated ? 1 : rows;
-    EXPECT_EQ(rows, expected) << name_of(kind);
-  }
 }
 
 TEST(GroupOutliers, NeedAGroupAndADistance) {

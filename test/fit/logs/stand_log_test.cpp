@@ -96,33 +96,25 @@ TEST(NamedColumns, KeepsOcclusionAndRepetitionInTheSteps) {
   EXPECT_EQ(import.table.steps[0].propeller, "own");
 }
 
-TEST(ColumnUnit, StandsInBracketsOfEitherKind) {
+TEST(ColumnUnit, StandsInBracketsOfEitherKindOrBehindAnUnderscore) {
   EXPECT_EQ(split_header("Motor Optical Speed (RPM)").name, "Motor Optical Speed");
   EXPECT_EQ(split_header("Motor Optical Speed (RPM)").unit, "RPM");
   EXPECT_EQ(split_header("Kraft [kgf]").unit, "kgf");
   EXPECT_EQ(split_header("thrust (raw) [N]").name, "thrust (raw)");
   EXPECT_EQ(split_header("plain").unit, "");
   EXPECT_EQ(split_header("").name, "");
-}
-
-TEST(ColumnUnit, MayStandBehindAnUnderscore) {
   EXPECT_EQ(unit_suffix("speed_rad_s", Measure::speed), "rad_s");
   EXPECT_EQ(unit_suffix("thrust_n", Measure::thrust), "n");
   EXPECT_EQ(unit_suffix("thrust_mean", Measure::thrust), "");
 }
 
-TEST(ColumnUnit, ConvertsExactly) {
+TEST(ColumnUnit, ConvertsExactlyAndOnlyUnitsOfItsMeasure) {
   EXPECT_DOUBLE_EQ(*unit_factor(Measure::thrust, "gf"), 9.80665e-3);
   EXPECT_DOUBLE_EQ(*unit_factor(Measure::thrust, "lbf"), 4.4482216152605);
   EXPECT_DOUBLE_EQ(*unit_factor(Measure::thrust, "ozf") * 16, *unit_factor(Measure::thrust, "lbf"));
   EXPECT_NEAR(*unit_factor(Measure::speed, "rad/s"), 9.549296585513721, 1e-14);
   EXPECT_DOUBLE_EQ(*unit_factor(Measure::torque, "lbf·ft"), 4.4482216152605 * 0.3048);
-}
-
-TEST(ColumnUnit, DoesNotTakeTheUnitOfAnotherMeasure) {
-  EXPECT_FALSE(unit_factor(Measure::thrust, "RPM"));
-  EXPECT_FALSE(unit_factor(Measure::thrust, ""));
-  EXPECT_FALSE(unit_factor(Measure::thrust, "MN"));
+  for (const char* other : {"RPM", "", "MN"}) EXPECT_FALSE(unit_factor(Measure::thrust, other)) << other;
 }
 
 constexpr const char* kHeader =
@@ -133,6 +125,10 @@ std::string table(const std::string& rows) { return std::string("\xEF\xBB\xBF") 
 
 std::string table_refusal(const std::string& text, const RowSelection& selection = {}) {
   return refusal([&] { return select_rows(read_rcbenchmark(text, "log.csv"), selection); });
+}
+
+double rpm_of(const StandLog& log, const RowSelection& selection) {
+  return to_rpm(RadPerSec(select_rows(log, selection).steps[0].speed_rad_s));
 }
 
 TEST(Rcbenchmark, ConvertsTheUnitOfTheHeader) {
@@ -146,29 +142,24 @@ TEST(Rcbenchmark, ConvertsTheUnitOfTheHeader) {
 }
 
 TEST(Rcbenchmark, RefusesAFileWithoutUnitOrSpeedAtItsHeader) {
-  EXPECT_THAT(table_refusal("Thrust,Motor Optical Speed (RPM)\n1,2\n"),
-              HasSubstr("log.csv:1: unknown unit \"\" of column \"Thrust\""));
-  EXPECT_THAT(table_refusal("Thrust (stone),Motor Optical Speed (RPM)\n1,2\n"),
-              HasSubstr("known are N, mN, kN, gf, kgf, lbf, ozf"));
-  EXPECT_THAT(table_refusal("Thrust (N)\n1\n"), HasSubstr("log.csv:1: no column \"Motor Electrical Speed (RPM)\" or"));
-  EXPECT_THAT(table_refusal("Thrust (N),Thrust (gf),Motor Optical Speed (RPM)\n1,1,1\n"),
-              HasSubstr("two Thrust columns"));
-  EXPECT_THAT(table_refusal("Thrust (N),Thrust (N),Motor Optical Speed (RPM)\n1,1,1\n"),
-              HasSubstr("more than one column"));
-  EXPECT_THAT(table_refusal(""), HasSubstr("log.csv:1"));
+  for (const auto& [text, words] : {
+           std::pair{"Thrust,Motor Optical Speed (RPM)\n1,2\n", "log.csv:1: unknown unit \"\" of column \"Thrust\""},
+           {"Thrust (stone),Motor Optical Speed (RPM)\n1,2\n", "known are N, mN, kN, gf, kgf, lbf, ozf"},
+           {"Thrust (N)\n1\n", "log.csv:1: no column \"Motor Electrical Speed (RPM)\" or"},
+           {"Thrust (N),Thrust (gf),Motor Optical Speed (RPM)\n1,1,1\n", "two Thrust columns"},
+           {"Thrust (N),Thrust (N),Motor Optical Speed (RPM)\n1,1,1\n", "more than one column"},
+           {"", "log.csv:1"},
+       })
+    EXPECT_THAT(table_refusal(text), HasSubstr(words)) << text;
 }
 
 TEST(Rcbenchmark, SelectsTheSpeedItIsTold) {
   const auto log = read_rcbenchmark(table("0,1100,100,6000,7000,11.1,,\n"), "log.csv");
-  EXPECT_NEAR(to_rpm(RadPerSec(select_rows(log).steps[0].speed_rad_s)), 6000, 1e-9);
-  EXPECT_NEAR(to_rpm(RadPerSec(select_rows(log, {.speed = SpeedSource::optical}).steps[0].speed_rad_s)), 7000, 1e-9);
-  const auto mended = select_rows(log, {.speed = SpeedSource::electrical, .speed_factor = 7.0 / 6});
-  EXPECT_NEAR(to_rpm(RadPerSec(mended.steps[0].speed_rad_s)), 7000, 1e-9);
-}
-
-TEST(Rcbenchmark, FallsBackToTheOpticalSpeedWhereTheElectricalNeverTurns) {
-  const auto imported = select_rows(read_rcbenchmark(table("0,1100,100,0,7000,11.1,,\n"), "log.csv"));
-  EXPECT_EQ(imported.speed_source, "optical");
+  EXPECT_NEAR(rpm_of(log, {}), 6000, 1e-9);
+  EXPECT_NEAR(rpm_of(log, {.speed = SpeedSource::optical}), 7000, 1e-9);
+  EXPECT_NEAR(rpm_of(log, {.speed = SpeedSource::electrical, .speed_factor = 7.0 / 6}), 7000, 1e-9);
+  const auto never = select_rows(read_rcbenchmark(table("0,1100,100,0,7000,11.1,,\n"), "log.csv"));
+  EXPECT_EQ(never.speed_source, "optical") << "where the electrical speed never turns";
 }
 
 TEST(Rcbenchmark, RefusesASpeedThatIsNotInTheFile) {

@@ -31,14 +31,19 @@ TEST(CurveFit, OfEveryFormIsALinearFunctionOfTheMeasuredKAndFliesAsItWasFitted) 
       EXPECT_EQ(fit.form, form);
       EXPECT_GE(fit.spare_points(), 0) << words;
       EXPECT_LT(fit.spare_points(), static_cast<double>(fit.points.size())) << words;
-      EXPECT_NE(fit.words().find(name_of(form)), std::string::npos) << words;
-      EXPECT_NE(std::string(fit.denial()), "") << words;
+      EXPECT_NE(fit.model().words(fit).find(name_of(form)), std::string::npos) << words;
+      EXPECT_NE(std::string(fit.model().denial()), "") << words;
       for (const double phi : {0.0, 30.0, 45.0, 100.0, 270.0}) {
         const std::vector<double> weights = fit.weights_at(phi);
         double k = 0;
         for (std::size_t i = 0; i < points.size(); ++i) k += weights[i] * points[i].k;
         EXPECT_NEAR(fit.k_at(phi) / k, 1, 1e-12) << words << phi;
         EXPECT_NEAR(fit.curve().at(from_degrees(phi)).value() / k, 1, 1e-12) << words << phi;
+      }
+      for (const CurveParameter& parameter : fit.parameters) {
+        double value = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) value += parameter.weights[i] * points[i].k;
+        EXPECT_NEAR(parameter.value / value, 1, 1e-11) << words << ": " << parameter.key;
       }
       for (std::size_t i = 0; i < fit.points.size(); ++i)
         EXPECT_EQ(fit.residuals[i], fit.points[i].k - fit.k_at(fit.points[i].phi_deg)) << words;

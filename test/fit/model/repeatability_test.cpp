@@ -45,9 +45,7 @@ TEST(OutlyingRuns, AreNamedAndKeptAndWidenTheBudget) {
 TEST(OutlyingRuns, AreNotLookedForAmongTwo) {
   auto steps = study_campaign({}, 1).steps;
   std::erase_if(steps, [](const auto& step) { return step.occlusion_deg > 45 || step.repetition > 2; });
-  IdentificationOptions anchored;
-  anchored.curve.anchored = true;
-  EXPECT_TRUE(outlying_runs(identify(steps, anchored).selection.used).empty());
+  EXPECT_TRUE(outlying_runs(identify(steps, {.curve = {.anchored = true}}).selection.used).empty());
 }
 
 TEST(Repeatability, AddsTheFreedomWithinTheRunsOfAllAngles) {
@@ -61,14 +59,11 @@ TEST(Repeatability, AddsTheFreedomWithinTheRunsOfAllAngles) {
 }
 
 TEST(LeftOutRuns, AreListedWithTheirCauseAndWeighNothing) {
-  IdentificationOptions options;
-  options.left_out = {parse_left_out_run("90:2:plate slipped: seen afterwards")};
+  IdentificationOptions options{.left_out = {parse_left_out_run("90:2:plate slipped: seen afterwards")}};
   const Identification found = identify(with_one_run_off(1, 0.03), options);
   EXPECT_EQ(found.table[2].repetitions, 2u);
-  std::size_t listed = 0;
-  for (const FlaggedStep& step : found.selection.flagged)
-    listed += step.reason == "by hand: plate slipped: seen afterwards";
-  EXPECT_EQ(listed, 34u);
+  EXPECT_EQ(
+      std::ranges::count(found.selection.flagged, "by hand: plate slipped: seen afterwards", &FlaggedStep::reason), 34);
   options.left_out = {{90, 4, "not there"}};
   EXPECT_THROW((void)identify(with_one_run_off(1, 0.03), options), FitError);
 }

@@ -27,18 +27,15 @@ TEST(StepSelection, TakesTheSpeedsAtBothEndsOfTheRange) {
   EXPECT_EQ(select_steps(std::vector{step_of(0.005, 0.3)}, {1000, 1000}, {}).used.size(), 1u);
 }
 
-TEST(StepUncertainty, IsTheStepsOwnWhereTheyTellIt) {
+TEST(StepUncertainty, IsTheStepsOwnWhereAllTellItAndNeverMixed) {
   const auto points = points_of(std::vector{step_of(0.005, 0.3), step_of(0.007, 0.4)});
   EXPECT_EQ(points[0].u_thrust_n, 0.005);
   EXPECT_EQ(points[1].u_thrust_n, 0.007);
   EXPECT_EQ(points[0].u_speed_rad_s, 0.3);
-}
-
-TEST(StepUncertainty, IsNeverMixedWithOneOfIndependentSamples) {
-  const auto points = points_of(std::vector{step_of(0.005, 0.3), step_of(results::kNotMeasured, 0.4)});
-  EXPECT_DOUBLE_EQ(points[0].u_thrust_n, 0.001);
-  EXPECT_DOUBLE_EQ(points[1].u_thrust_n, 0.001);
-  EXPECT_EQ(points[0].u_speed_rad_s, 0.3) << "of the speed all tell";
+  const auto mixed = points_of(std::vector{step_of(0.005, 0.3), step_of(results::kNotMeasured, 0.4)});
+  EXPECT_DOUBLE_EQ(mixed[0].u_thrust_n, 0.001);
+  EXPECT_DOUBLE_EQ(mixed[1].u_thrust_n, 0.001);
+  EXPECT_EQ(mixed[0].u_speed_rad_s, 0.3) << "of the speed all tell";
   EXPECT_DOUBLE_EQ(points_of(std::vector{step_of(0.005, 0)})[0].u_speed_rad_s, 0.1);
 }
 
@@ -50,8 +47,7 @@ TEST(StepUncertainty, OfCorrelatedSamplesWeighsLess) {
     step.thrust_u_n = poor ? 0.05 : 0.001;
     if (poor) step.thrust_n += 0.05;
   }
-  IdentificationOptions options;
-  options.weighting = Weighting::thrust;
+  const IdentificationOptions options{.weighting = Weighting::thrust};
   const double k = CampaignTruth{}.K_T;
   EXPECT_NEAR(identify(steps, options).table[0].k / k, 1, 1e-4);
   for (StepMean& step : steps) step.thrust_u_n = results::kNotMeasured;

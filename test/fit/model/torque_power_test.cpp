@@ -10,35 +10,25 @@ namespace kphi::fit {
 namespace torque_power_test {
 
 results::StepMean step(double phi, int number, double thrust_n) {
-  results::StepMean one;
-  one.occlusion_deg = phi;
-  one.repetition = 1;
-  one.step = number;
+  results::StepMean one = step_at(phi, 1, number);
   one.thrust_n = thrust_n;
   return one;
 }
 
-TEST(Power, IsThatOfTheSupplyWhereItWasMeasured) {
+TEST(Power, IsThatOfTheSupplyWhereItWasMeasuredElseThatOfTheModule) {
   results::StepMean one = step(0, 3, 9.80665);
   one.supply_voltage_v = 11.5;
   one.supply_current_a = 10;
-  one.supply_w = 200;
-  const auto rows = power_of({&one, 1});
-  ASSERT_EQ(rows.size(), 1u);
-  EXPECT_TRUE(rows[0].by_supply);
-  EXPECT_DOUBLE_EQ(rows[0].power_w, 200);
-  EXPECT_DOUBLE_EQ(rows[0].gram_per_watt(), 5);
-  EXPECT_DOUBLE_EQ(rows[0].newton_per_watt(), 9.80665 / 200);
-}
-
-TEST(Power, ElseItIsThatOfTheModule) {
-  results::StepMean one = step(0, 3, 2);
-  one.supply_voltage_v = 11.5;
-  one.supply_current_a = 10;
-  const auto rows = power_of({&one, 1});
-  ASSERT_EQ(rows.size(), 1u);
-  EXPECT_FALSE(rows[0].by_supply);
-  EXPECT_DOUBLE_EQ(rows[0].power_w, 115);
+  for (const double supply_w : {200.0, results::kNotMeasured}) {
+    one.supply_w = supply_w;
+    const auto rows = power_of({&one, 1});
+    ASSERT_EQ(rows.size(), 1u);
+    EXPECT_EQ(rows[0].by_supply, supply_w == 200);
+    const double watt = supply_w == 200 ? 200 : 115;
+    EXPECT_DOUBLE_EQ(rows[0].power_w, watt);
+    EXPECT_DOUBLE_EQ(rows[0].gram_per_watt(), 1000 / watt);
+    EXPECT_DOUBLE_EQ(rows[0].newton_per_watt(), 9.80665 / watt);
+  }
 }
 
 TEST(Power, IsTheMeanOfTheRepetitionsOfAStep) {

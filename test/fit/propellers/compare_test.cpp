@@ -1,5 +1,6 @@
 #include "fit/propellers/compare.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ namespace compare_test {
 using test::TemporaryFolder;
 using ::testing::HasSubstr;
 
-ComparedResult result(std::initializer_list<ComparedValue> values) {
+ComparedResult result(std::vector<ComparedValue> values) {
   ComparedResult made;
   made.name = "made";
   made.propeller = "5x3";
@@ -80,10 +81,7 @@ TEST(Compare, CorrectsForTheNumberOfComparisons) {
     a.push_back({"k" + std::to_string(i), "", 1, 0.01 / std::sqrt(2)});
     b.push_back({"k" + std::to_string(i), "", 1 + (i == 2 ? 0.01 * z : 0), 0.01 / std::sqrt(2)});
   }
-  ComparedResult five_a = result({}), five_b = result({});
-  five_a.estimates = a;
-  five_b.estimates = b;
-  EXPECT_EQ(compare(five_a, five_b).verdict, Agreement::agree);
+  EXPECT_EQ(compare(result(a), result(b)).verdict, Agreement::agree);
   EXPECT_EQ(compare(result({a[2]}), result({b[2]})).verdict, Agreement::differ);
 }
 
@@ -119,9 +117,7 @@ TEST(Compare, IsWrongOnceInTwentyOfEqualPairs) {
 
 TEST(Compare, ReadsCampaignFolders) {
   const TemporaryFolder folder;
-  CampaignTruth other;
-  other.K_T *= 1.02;
-  other.intercept *= 1.02;
+  const CampaignTruth truth, other{1.02 * truth.K_T, 1.02 * truth.intercept};
   const std::string monday = campaign(folder, "monday", {}, 1), tuesday = campaign(folder, "tuesday", {}, 2),
                     changed = campaign(folder, "changed", other, 3);
   const Comparison same = compare(load_result(monday), load_result(tuesday));
@@ -154,10 +150,8 @@ TEST(Compare, RemarksWhatMakesResultsUnlike) {
   b.air = Estimate{1.1, 0.01};
   const Comparison comparison = compare(a, b);
   EXPECT_NEAR(*comparison.diameter_ratio4, 2.0736, 1e-12);
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("5x3 and 6x3")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("different speeds")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("compared in standard air")));
-  EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr("only in made: k(90°)")));
+  for (const char* remark : {"5x3 and 6x3", "different speeds", "compared in standard air", "only in made: k(90°)"})
+    EXPECT_THAT(comparison.remarks, ::testing::Contains(HasSubstr(remark)));
 }
 
 TEST(Compare, SeesTheSamePropellerInAnyAir) {

@@ -22,15 +22,15 @@ const BudgetRow& row_of(const Budget& budget, const std::string& source) {
   throw std::out_of_range(source);
 }
 
-struct Study {
+struct StudyAnalysis : testing::Test {
   StudyCampaign campaign = study_campaign({}, 5);
   Identification found = identify(campaign.steps);
   AnalysisOptions options = study_options({});
+  const Analysis analysis = analyse(found, options);
 };
 
-TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
-  Study study;
-  const Budget budget = analyse(study.found, study.options).coefficients[1];
+TEST_F(StudyAnalysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
+  const Budget budget = analysis.coefficients[1];
   EXPECT_EQ(budget.quantity, "k(45 deg)");
   for (const char* source : {"noise within runs", "repetitions", "zero", "model T = k w^2", "cell calibration",
                              "cross-axis", "alignment", "motor clock"})
@@ -44,76 +44,48 @@ TEST(Analysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
   EXPECT_NEAR(shares, 1, 1e-12);
 }
 
-TEST(Analysis, TheZerosOwnUncertaintyIsInEveryK) {
-  Study study;
-  const Analysis before = analyse(study.found, study.options);
-  for (results::StepMean& step : study.campaign.steps) step.zero_u_n = 0.05;
-  const Analysis after = analyse(identify(study.campaign.steps), study.options);
-  for (std::size_t i = 0; i < before.coefficients.size(); ++i) {
+TEST_F(StudyAnalysis, TheZerosOwnUncertaintyIsInEveryK) {
+  for (results::StepMean& step : campaign.steps) step.zero_u_n = 0.05;
+  const Analysis after = analyse(identify(campaign.steps), options);
+  for (std::size_t i = 0; i < analysis.coefficients.size(); ++i) {
     const double u = row_of(after.coefficients[i], "zero").u;
-    EXPECT_NEAR(u, std::hypot(row_of(before.coefficients[i], "zero").u, 0.05 / std::sqrt(3.0)), 1e-12) << "three runs";
-    EXPECT_GT(after.coefficients[i].combined(), before.coefficients[i].combined() * 0.9);
+    EXPECT_NEAR(u, std::hypot(row_of(analysis.coefficients[i], "zero").u, 0.05 / std::sqrt(3.0)), 1e-12)
+        << "three runs";
+    EXPECT_GT(after.coefficients[i].combined(), analysis.coefficients[i].combined() * 0.9);
   }
 }
 
-TEST(Analysis, WhatIsCommonToAllCancelsInTheScalingFactor) {
-  Study study;
-  const Analysis before = analyse(study.found, study.options);
-  study.options.bench.cell_calibration = 0.5;
-  study.options.bench.motor_clock = 0.5;
-  study.options.bench.alignment_rad = 0.02;
-  const Analysis after = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, WhatIsCommonToAllCancelsInTheScalingFactor) {
+  options.bench.cell_calibration = 0.5;
+  options.bench.motor_clock = 0.5;
+  options.bench.alignment_rad = 0.02;
+  const Analysis after = analyse(found, options);
   EXPECT_GT(after.coefficients[0].combined(), 0.4 * after.coefficients[0].value);
   EXPECT_GT(after.predictions[0].speed_u_share, 0.2);
   const Budget& k = after.coefficients[0];
   EXPECT_NEAR(row_of(k, "alignment").contribution() / k.value, 0.02 * 0.02 / std::sqrt(2.0), 1e-12);
-  EXPECT_NEAR(after.predictions[0].scaling_factor.combined() / before.predictions[0].scaling_factor.combined(), 1,
+  EXPECT_NEAR(after.predictions[0].scaling_factor.combined() / analysis.predictions[0].scaling_factor.combined(), 1,
               1e-9);
 }
 
-TEST(Analysis, CovarianceBelongsToTheBudgets) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, CovarianceBelongsToTheBudgets) {
   EXPECT_NEAR(std::sqrt(analysis.covariance[0][0]) / analysis.coefficients[0].combined(), 1, 1e-12);
   EXPECT_NEAR(std::sqrt(analysis.covariance[1][1]) / analysis.parameters[0].combined(), 1, 1e-9);
   EXPECT_NEAR(std::sqrt(analysis.covariance[2][2]) / analysis.parameters[1].combined(), 1, 1e-9);
   EXPECT_LT(analysis.covariance[1][2], 0);
 }
 
-TEST(Analysis, LineWeightsAreTheLine) {
-  for (const bool anchored : {false, true}) {
-    IdentificationOptions options;
-    options.curve.anchored = anchored;
-    const Identification found = identify(study_campaign({}, 6).steps, options);
-    std::vector<double> phis;
-    for (const auto& row : found.table) phis.push_back(row.phi_deg);
-    const auto sum_of = [&](const std::vector<double>& weights) {
-      double sum = 0;
-      for (std::size_t i = 0; i < phis.size(); ++i) sum += weights[i] * found.table[i].k;
-      return sum;
-    };
-    for (const CurveParameter& parameter : found.curve_fit.parameters)
-      EXPECT_NEAR(sum_of(parameter.weights) / parameter.value, 1, 1e-11) << parameter.key;
-    for (const double phi : {0.0, 30.0, 200.0})
-      EXPECT_NEAR(sum_of(found.curve_fit.weights_at(phi)) / found.curve_fit.k_at(phi), 1, 1e-11) << phi;
-  }
-}
-
-TEST(Analysis, StandardAirAddsTheDensity) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
-  const double scale = kStandardDensity / study.campaign.measured_density;
+TEST_F(StudyAnalysis, StandardAirAddsTheDensity) {
+  const double scale = kStandardDensity / campaign.measured_density;
   EXPECT_NEAR(analysis.standard[0].value / (analysis.coefficients[0].value * scale), 1, 1e-12);
   EXPECT_NEAR(row_of(analysis.standard[0], "cell calibration").contribution(), 2e-3 * analysis.standard[0].value,
               1e-17);
   EXPECT_NEAR(row_of(analysis.standard[0], "air density").contribution(), 3e-3 * analysis.standard[0].value, 1e-17);
-  study.found.table[1].air.reset();
-  EXPECT_TRUE(analyse(study.found, study.options).standard.empty()) << "never 1.225 in silence";
+  found.table[1].air.reset();
+  EXPECT_TRUE(analyse(found, options).standard.empty()) << "never 1.225 in silence";
 }
 
-TEST(Analysis, ReportsWhatEquationFourWillMeet) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, ReportsWhatEquationFourWillMeet) {
   ASSERT_TRUE(analysis.shape.clipping_deg);
   EXPECT_NEAR(*analysis.shape.clipping_deg, 10.4, 4);
   EXPECT_NEAR(*analysis.shape.zero_deg, 356.5, 4);
@@ -122,9 +94,7 @@ TEST(Analysis, ReportsWhatEquationFourWillMeet) {
   EXPECT_THAT(analysis.remarks, ::testing::Contains(HasSubstr("reaches 0 at")));
 }
 
-TEST(Analysis, TorqueFollowsTheSameEstimators) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, TorqueFollowsTheSameEstimators) {
   ASSERT_EQ(analysis.torque.size(), 5u);
   for (std::size_t i = 0; i < 5; ++i)
     EXPECT_NEAR(analysis.torque[i].drag_per_thrust_m.value, 0.013, 4 * analysis.torque[i].drag_per_thrust_m.u + 1e-5);
@@ -177,76 +147,25 @@ TEST(Analysis, OfATableWithoutErrorsInventsNone) {
 TEST(Analysis, ListsThePointsThatTheLossIgnored) {
   auto steps = study_campaign({}, 8).steps;
   steps[35].thrust_n *= 3;
-  IdentificationOptions options;
-  options.loss = Loss::tukey;
-  const Analysis analysis = analyse(identify(steps, options));
-  ASSERT_FALSE(analysis.rejected.empty());
-  bool listed = false;
-  for (const RejectedPoint& point : analysis.rejected)
-    listed = listed || (point.phi_deg == 0 && point.repetition == 1 && point.step == 35 && point.robust_weight == 0);
-  EXPECT_TRUE(listed);
+  const Analysis analysis = analyse(identify(steps, {.loss = Loss::tukey}));
+  EXPECT_TRUE(std::ranges::any_of(analysis.rejected, [](const RejectedPoint& point) {
+    return point.phi_deg == 0 && point.repetition == 1 && point.step == 35 && point.robust_weight == 0;
+  }));
 }
 
-TEST(Analysis, NeighbouringOcclusionsDiffer) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, NeighbouringOcclusionsDiffer) {
   ASSERT_EQ(analysis.differences.size(), 4u);
   for (const HypothesisTest& test : analysis.differences) EXPECT_TRUE(test.rejected()) << test.name;
 }
 
-/// Each k by Welch's test: the same propeller on two set-ups.
-std::vector<HypothesisTest> compare_setups(const Analysis& one, const Analysis& other) {
-  std::vector<HypothesisTest> tests;
-  for (std::size_t i = 0; i < one.coefficients.size(); ++i)
-    tests.push_back(welch_test(one.coefficients[i].estimate(), other.coefficients[i].estimate()));
-  return tests;
-}
-
-TEST(Analysis, TellsTwoSetupsApartOnlyWhereTheyDiffer) {
-  int differ = 0;
-  for (unsigned seed = 100; seed < 120; ++seed) {
-    StudyCampaign one = study_campaign({}, seed), other = study_campaign({}, seed + 1000);
-    for (auto& step : other.steps) step.thrust_n *= one.density / other.density;
-    const auto tests = compare_setups(analyse(identify(one.steps), study_options({})),
-                                      analyse(identify(other.steps), study_options({})));
-    ASSERT_EQ(tests.size(), 5u);
-    for (const HypothesisTest& test : tests) differ += test.rejected() ? 1 : 0;
-  }
-  EXPECT_LE(differ, 15) << "5 % of 100";
-  StudyCampaign one = study_campaign({}, 1), bigger = one;
-  for (auto& step : bigger.steps) step.thrust_n *= 1.04;
-  for (const auto& test : compare_setups(analyse(identify(one.steps), study_options({})),
-                                         analyse(identify(bigger.steps), study_options({}))))
-    EXPECT_TRUE(test.rejected()) << test.name;
-}
-
-TEST(Analysis, EveryEstimatorFindsTheTruth) {
-  StudyTruth truth;
-  const StudyCampaign campaign = study_campaign(truth, 9);
-  for (const Estimator estimator :
-       {Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed}) {
-    IdentificationOptions options;
-    options.estimator = estimator;
-    const Identification found = identify(campaign.steps, options);
-    const Analysis analysis = analyse(found, study_options(truth));
-    for (std::size_t i = 0; i < found.table.size(); ++i) {
-      const double expected = truth.k(found.table[i].phi_deg) * campaign.density / kStandardDensity;
-      EXPECT_NEAR(found.table[i].k, expected, 4 * analysis.coefficients[i].combined())
-          << name_of(estimator) << " at " << found.table[i].phi_deg;
-    }
-  }
-}
-
-TEST(Analysis, IsWrittenWithoutWhatJsonCannotHold) {
-  Study study;
-  const Analysis analysis = analyse(study.found, study.options);
+TEST_F(StudyAnalysis, IsWrittenWithoutWhatJsonCannotHold) {
   const std::string text = nlohmann::ordered_json(analysis).dump();
   EXPECT_EQ(text.find("nan"), std::string::npos);
   EXPECT_EQ(text.find("inf"), std::string::npos);
   EXPECT_THAT(text, HasSubstr("\"source\":\"zero\""));
-  const std::string yaml = format_coefficients({study.found, analysis}, {});
+  const std::string yaml = format_coefficients({found, analysis}, {});
   EXPECT_THAT(yaml, HasSubstr("not_known: [cross-axis, alignment]"));
-  EXPECT_EQ(yaml, format_coefficients({study.found, analysis}, {}));
+  EXPECT_EQ(yaml, format_coefficients({found, analysis}, {}));
 }
 
 }  // namespace analysis_test

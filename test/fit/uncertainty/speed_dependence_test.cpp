@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <map>
 #include <random>
 
@@ -94,12 +93,10 @@ TEST(SpeedDependence, TakesCorrelatedNoiseAndAWanderingZeroForNoTrendEither) {
 
 TEST(SpeedDependence, FindsABendBesideASharedZero) {
   Verdicts open, small, real;
-  StudyTruth bent;
-  bent.rise = 0.15;  // real ones of 5 inch rise by 11 to 21 %
   for (unsigned seed = 1; seed <= 60; ++seed) {
     open.add(all_of(with_shared_zeros(risen(campaign_steps({}, seed), 0.15), seed, false)));
     small.add({all_of(with_shared_zeros(risen(campaign_steps({}, seed), 0.02), seed, true)).front()});
-    real.add(all_of(study_campaign(bent, seed).steps));
+    real.add(all_of(study_campaign({.rise = 0.15}, seed).steps));
   }
   EXPECT_GE(open.percent(&Verdicts::depends), 95);
   EXPECT_GE(small.percent(&Verdicts::depends), 95) << "2 % at phi = 0";
@@ -136,11 +133,7 @@ TEST(SpeedDependence, CannotTestTwoLevels) {
 }
 
 TEST(SpeedDependence, OfPerfectStepsIsNone) {
-  CampaignTruth truth;
-  truth.noise_n = 0;
-  for (const SpeedDependence& found : all_of(campaign_steps(truth))) {
-    EXPECT_NEAR(found.change.value, 0, 1e-9);
-  }
+  for (const SpeedDependence& found : all_of(campaign_steps({.noise_n = 0}))) EXPECT_NEAR(found.change.value, 0, 1e-9);
 }
 
 }  // namespace speed_dependence_test

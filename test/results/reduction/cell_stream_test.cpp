@@ -4,11 +4,9 @@
 
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace cell_stream_test {
+namespace kphi::results::cell_stream_test {
 
-using test::make_run;
-using test::Truth;
+using namespace test;
 
 struct Stream : LoadCellColumns, CellStream {
   explicit Stream(const RunRecording& run) : LoadCellColumns(run.load_cell, run.header), CellStream(run, *this) {}
@@ -106,5 +104,4 @@ TEST(CellStream, GivesEvenSamplesWithGapsFilledAndNoneAcrossARestart) {
   EXPECT_TRUE(Stream(run).samples(kSecond).counts.empty()) << "the box restarted at 2.3 s";
 }
 
-}  // namespace cell_stream_test
-}  // namespace kphi::results
+}  // namespace kphi::results::cell_stream_test

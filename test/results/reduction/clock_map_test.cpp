@@ -2,15 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace clock_map_test {
-using test::make_run;
-using test::Truth;
+namespace kphi::results::clock_map_test {
+using namespace test;
 
 struct Map : LoadCellColumns, ClockMap {
   Map(const std::vector<LoadCellRecord>& records, double rate_hz, std::span<const StreamEvent> events = {})
@@ -163,5 +158,4 @@ TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
   EXPECT_FALSE(std::abs(unaware.epochs()[0].skew) < 500e-6) << "without the break the clock seems far off";
 }
 
-}  // namespace clock_map_test
-}  // namespace kphi::results
+}  // namespace kphi::results::clock_map_test

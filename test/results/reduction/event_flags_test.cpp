@@ -3,8 +3,7 @@
 #include "results/reduction/quality_flags.hpp"
 #include "results/steps_csv.hpp"
 
-namespace kphi::results {
-namespace event_flags_test {
+namespace kphi::results::event_flags_test {
 
 struct Step {
   Nanoseconds begin, end;
@@ -52,5 +51,4 @@ TEST(EventFlags, RangesAndRestartsOfTheBoxShowInTheSamplesThemselves) {
   }
 }
 
-}  // namespace event_flags_test
-}  // namespace kphi::results
+}  // namespace kphi::results::event_flags_test

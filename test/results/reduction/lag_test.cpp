@@ -6,8 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace kphi::results {
-namespace lag_test {
+namespace kphi::results::lag_test {
 
 struct Truth {
   double delay_s = 0;
@@ -137,5 +136,4 @@ TEST(Lag, ExplainsTheThrust) {
   for (std::size_t i = 0; i < squared.size(); ++i) EXPECT_NEAR(1.5e-6 * squared[i], step.thrust[i], 0.005) << i;
 }
 
-}  // namespace lag_test
-}  // namespace kphi::results
+}  // namespace kphi::results::lag_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace kphi::results {
-namespace motor_series_test {
+namespace kphi::results::motor_series_test {
 
 std::vector<MotorReading> speeds(std::initializer_list<double> values) {
   std::vector<MotorReading> readings;
@@ -57,5 +56,4 @@ TEST(MotorSeries, TellsMeanDeviationAndLeastOfAWindow) {
   EXPECT_EQ(MotorSeries(readings).statistics(MotorChannel::derate, kAll).n, 0u);
 }
 
-}  // namespace motor_series_test
-}  // namespace kphi::results
+}  // namespace kphi::results::motor_series_test

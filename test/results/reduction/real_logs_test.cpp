@@ -1,22 +1,16 @@
 // Logs of real stands, as if they had been recorded here. Skipped where KPHI_TEST_DATA does not say where they are.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/motor_series.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
+#include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace real_logs_test {
+namespace kphi::results::real_logs_test {
 
 constexpr double kRpm = M_PI / 30;
 
@@ -67,6 +61,8 @@ class RealLogs : public testing::Test {
 
 constexpr double kRate = 26;
 
+Nanoseconds at_row(std::size_t row) { return static_cast<Nanoseconds>(1e9 * static_cast<double>(row) / kRate); }
+
 /// A load cell that counts micronewtons 26 times a second, row after row.
 RunRecording recording(const std::vector<Row>& rows) {
   RunRecording run;
@@ -76,7 +72,7 @@ RunRecording recording(const std::vector<Row>& rows) {
   run.header.load_cell.device_rate_hz = kRate;
   std::int32_t torque = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto time = static_cast<Nanoseconds>(1e9 * static_cast<double>(i) / kRate);
+    const auto time = at_row(i);
     LoadCellRecord record;
     const bool frozen = i > 0 && rows[i].thrust_n == rows[i - 1].thrust_n;
     if (!frozen) torque = static_cast<std::int32_t>(i);  // there is no torque channel: another count with every thrust
@@ -88,8 +84,6 @@ RunRecording recording(const std::vector<Row>& rows) {
   }
   return run;
 }
-
-Nanoseconds at_row(std::size_t row) { return static_cast<Nanoseconds>(1e9 * static_cast<double>(row) / kRate); }
 
 TEST_F(RealLogs, TheZeroOfTheRampIsRecognised) {
   const auto log = rows("Polar_2021-06-18_140528");
@@ -171,8 +165,7 @@ TEST_F(RealLogs, TheReductionSaysThatAStepOfTheDecayingLogDrifts) {
                 {Phase::end, -1, at_row(kept.size()), 0}};
   const auto steps = reduce(run);
   ASSERT_EQ(steps.size(), 1u);
-  EXPECT_NE(steps[0].quality_flags & static_cast<std::uint32_t>(QualityFlag::drifted), 0u)
-      << quality_flag_names(steps[0].quality_flags);
+  EXPECT_TRUE(test::has(steps[0], QualityFlag::drifted)) << quality_flag_names(steps[0].quality_flags);
 }
 
 /// Steps of 100 rows, without zeros but for rows that are put in front.
@@ -189,20 +182,12 @@ std::vector<StepMean> steps_of(const std::vector<Row>& rows) {
   return reduce(run);
 }
 
-std::vector<int> steps_flagged(const std::vector<StepMean>& steps, QualityFlag flag) {
-  std::vector<int> numbers;
-  for (std::size_t i = 0; i < steps.size(); ++i) {
-    if ((steps[i].quality_flags & static_cast<std::uint32_t>(flag)) != 0) numbers.push_back(static_cast<int>(i));
-  }
-  return numbers;
-}
-
 TEST_F(RealLogs, AFrozenChannelIsNamedAtItsStepsAndAtNoOther) {
   auto log = rows("ConstVel_2021-06-17_084922");
   log.resize(1500);
-  EXPECT_TRUE(steps_flagged(steps_of(log), QualityFlag::frozen).empty()) << "it has no such rows of its own";
+  EXPECT_TRUE(test::steps_flagged(steps_of(log), QualityFlag::frozen).empty()) << "it has no such rows of its own";
   for (std::size_t i = 400; i < 800; ++i) log[i].thrust_n = log[400].thrust_n;
-  EXPECT_EQ(steps_flagged(steps_of(log), QualityFlag::frozen), (std::vector{4, 5, 6, 7}));
+  EXPECT_EQ(test::steps_flagged(steps_of(log), QualityFlag::frozen), (std::vector{4, 5, 6, 7}));
 }
 
 TEST_F(RealLogs, ImpossibleSpeedsAreNamedAtTheirSteps) {
@@ -210,8 +195,7 @@ TEST_F(RealLogs, ImpossibleSpeedsAreNamedAtTheirSteps) {
   std::uint64_t counted = 0;
   for (const auto& step : steps_of(log)) {
     counted += step.speed_glitches;
-    EXPECT_EQ((step.quality_flags & static_cast<std::uint32_t>(QualityFlag::speed_glitch)) != 0,
-              step.speed_glitches > 0);
+    EXPECT_EQ(test::has(step, QualityFlag::speed_glitch), step.speed_glitches > 0);
   }
   EXPECT_GT(counted, 0u);
 }
@@ -229,5 +213,4 @@ TEST_F(RealLogs, ImpossibleSpeedsAreCounted) {
   EXPECT_LT(left, spikes) << "those that last longer than two readings stay";
 }
 
-}  // namespace real_logs_test
-}  // namespace kphi::results
+}  // namespace kphi::results::real_logs_test

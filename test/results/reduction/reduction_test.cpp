@@ -2,21 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "base/error.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace reduction_test {
-using test::make_run;
-using test::spin_down_at;
-using test::Truth;
-
-double k_of(const StepMean& step) { return step.thrust_n / (step.speed_rad_s * step.speed_rad_s); }
+namespace kphi::results::reduction_test {
+using namespace test;
 
 TEST(Reduction, FindsTheKnownCoefficientWithoutFlag) {
   const Truth truth;
@@ -121,17 +113,17 @@ TEST(Reduction, TheZeroOfTheTorqueIsSubtractedAndInterpolated) {
 }
 
 TEST(Reduction, FlagsAMeanOfUnknownUncertainty) {
-  const auto flags = [](double dwell_s, double reading_s) {
+  const auto too_few = [](double dwell_s, double reading_s) {
     Truth truth;
     truth.noise_n = 0.001;
     truth.motor_tau_s = 0.02;
     truth.dwell_s = dwell_s;
     truth.reading_s = reading_s;
-    return reduce(make_run(truth)).at(1).quality_flags & static_cast<std::uint32_t>(QualityFlag::few_samples);
+    return has(reduce(make_run(truth)).at(1), QualityFlag::few_samples);
   };
-  EXPECT_EQ(flags(1.2, 0.01), 0u);
-  EXPECT_NE(flags(1.05, 0.004), 0u) << "five bins of thrust";
-  EXPECT_NE(flags(1.1, 0.02), 0u) << "five readings of the speed";
+  EXPECT_FALSE(too_few(1.2, 0.01));
+  EXPECT_TRUE(too_few(1.05, 0.004)) << "five bins of thrust";
+  EXPECT_TRUE(too_few(1.1, 0.02)) << "five readings of the speed";
 }
 
 TEST(Reduction, FlagsAStepWithoutSamples) {
@@ -141,7 +133,7 @@ TEST(Reduction, FlagsAStepWithoutSamples) {
                 [](const auto& r) { return r.arrival_ns > 3'100'000'000 && r.arrival_ns < 5'000'200'000; });
   const auto steps = reduce(run);
   EXPECT_TRUE(std::isnan(steps.at(1).thrust_n));
-  EXPECT_NE(steps.at(1).quality_flags & static_cast<std::uint32_t>(QualityFlag::few_samples), 0u);
+  EXPECT_TRUE(has(steps.at(1), QualityFlag::few_samples));
   EXPECT_NEAR(k_of(steps.at(2)), truth.k, 5e-3 * truth.k);
 }
 
@@ -166,7 +158,7 @@ TEST(Reduction, TheZeroAfterIsOnlyTakenWhenTheMotorStands) {
   Truth truth;
   truth.noise_n = 0.001;
   RunRecording run = make_run(truth);
-  const double after = test::spin_down_at(truth) + test::kSpinDown;
+  const double after = spin_down_at(truth) + kSpinDown;
   for (auto& r : run.motor) {
     if (r.channel == MotorChannel::speed && 1e-9 * static_cast<double>(r.time_ns) > after) r.value = 100;
   }
@@ -214,5 +206,4 @@ TEST(Reduction, GivesTheSameBytesFromMemoryAndFromTheFile) {
   EXPECT_EQ(format_steps(reduce(run)), format_steps(reduce(read_run(folder / "a.h5"))));
 }
 
-}  // namespace reduction_test
-}  // namespace kphi::results
+}  // namespace kphi::results::reduction_test

@@ -1,24 +1,14 @@
 // Whether the figures of a step are what they claim: runs of known truth through the whole reduction.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/reduction/zeros.hpp"
 #include "results/steps_csv.hpp"
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace step_study_test {
-using test::make_run;
-using test::Truth;
-
-bool has(const StepMean& step, QualityFlag flag) {
-  return (step.quality_flags & static_cast<std::uint32_t>(flag)) != 0;
-}
+namespace kphi::results::step_study_test {
+using namespace test;
 
 constexpr double kRpm = M_PI / 30;
 
@@ -185,5 +175,4 @@ TEST(StepStudy, ADeviationOverTheRootOfTheNumberWouldBeFiveTimesTooSmall) {
   }
 }
 
-}  // namespace step_study_test
-}  // namespace kphi::results
+}  // namespace kphi::results::step_study_test

@@ -1,21 +1,13 @@
 #include "results/reduction/zeros.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
 
 #include "test/results/synthetic_run.hpp"
 
-namespace kphi::results {
-namespace zeros_test {
+namespace kphi::results::zeros_test {
 
-using test::make_run;
-using test::Truth;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using namespace test;
+using namespace testing;
 
 struct Built {
   explicit Built(const Truth& truth) : run(make_run(truth)) {}
@@ -103,5 +95,4 @@ TEST(ZeroCheck, RefusesAZeroThatWandersThoughItsSamplesScatterLittle) {
   EXPECT_TRUE(check.noisy());
 }
 
-}  // namespace zeros_test
-}  // namespace kphi::results
+}  // namespace kphi::results::zeros_test

@@ -15,19 +15,16 @@ namespace exchange_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
+using fake::Connected;
+using fake::is_reply;
 using fake::Wire;
 
 constexpr Duration kTimeout = 100ms;
 
-bool is_reply(const Bytes& reply, int type, int sub) { return reply.size() > 4 && reply[2] == type && reply[3] == sub; }
-
 TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
   // Alone: what a module answers later leaves after them.
   for (const double factor : {1.01, 1.5, 1.99, 5.0}) {
-    Wire wire;
-    wire.connect();
-    wire.run_for(500ms);
-    wire.readings();
+    Connected wire(500ms);
     bool delayed = false;
     Instant line_free{0};
     wire.spoil = [&](Bytes& reply, Duration& delay) {
@@ -51,10 +48,7 @@ TEST(Replies, ThatComeLateNeverAnswerTheNextRequest) {
 TEST(Replies, OfALineThatStallsInOrderAreNeverTakenForLaterOnes) {
   // A true serial line keeps the order: while it stalls, nothing passes. Each value tells when it was asked.
   std::mt19937 random(11);
-  Wire wire;
-  wire.connect();
-  wire.run_for(200ms);
-  wire.readings();
+  Connected wire(200ms);
   Instant line_free{0};
   wire.spoil = [&](Bytes& reply, Duration& delay) {
     if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 0, fake::f32(to_seconds(wire.now)));
@@ -76,9 +70,7 @@ TEST(Replies, OfALineThatStallsInOrderAreNeverTakenForLaterOnes) {
 }
 
 TEST(Replies, LeftUnreadByAHostThatSleptAreNotTakenForLaterOnes) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(500ms);
+  Connected wire(500ms);
   Session& session = wire.session;
   while (session.output().empty()) {
     wire.now = session.deadline();
@@ -122,10 +114,7 @@ TEST(Replies, ThatBeganToComeBeforeTheirQuestionAreSecondCopies) {
 }
 
 TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
-  wire.readings();
+  Connected wire(100ms);
   wire.spoil = [](Bytes& reply, Duration&) {
     if (is_reply(reply, 50, 13)) reply = fake::message(50, 13, 3, 5, fake::f32(999));
   };
@@ -137,10 +126,7 @@ TEST(Replies, OfAnotherModuleAreRejectedAndCounted) {
 }
 
 TEST(Replies, OfTheWrongLengthAreCountedAndNotStored) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
-  wire.readings();
+  Connected wire(100ms);
   for (const Bytes& data : {Bytes{}, Bytes{1}, Bytes{1, 2, 3, 4, 5}, Bytes(57, 0)}) {
     const auto before = wire.session.counters().wrong_length;
     wire.module.values[{50, 13}] = data;
@@ -153,10 +139,7 @@ TEST(Replies, OfTheWrongLengthAreCountedAndNotStored) {
 }
 
 TEST(Replies, ThatAreNoNumbersAreCountedAndNotStored) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
-  wire.readings();
+  Connected wire(100ms);
   wire.module.values[{50, 13}] = fake::u32(0x7FC00000);
   wire.run_for(100ms);
   wire.module.values[{50, 13}] = fake::u32(0xFF800000);
@@ -166,9 +149,7 @@ TEST(Replies, ThatAreNoNumbersAreCountedAndNotStored) {
 }
 
 TEST(Replies, ToNothingThatWasAskedAreCounted) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
+  Connected wire(100ms);
   const auto before = wire.session.counters();
   wire.deliver(fake::message(50, 37, 3, 0, fake::f32(1)));
   wire.deliver(fake::message(50, 13, 0, 0));  // an echo of our own request
@@ -180,10 +161,7 @@ TEST(Replies, ToNothingThatWasAskedAreCounted) {
 
 TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
   for (const std::uint8_t length : {0x0A, 0x1E, 0x3B}) {
-    Wire wire;
-    wire.connect();
-    wire.run_for(100ms);
-    wire.readings();
+    Connected wire(100ms);
     const auto timeouts = wire.session.counters().timeouts;
     wire.deliver({0x55, length, 0x32});
     wire.run_for(kTimeout);
@@ -193,10 +171,7 @@ TEST(Resync, BringsTheNextReplyWithinOneTimeoutAfterAFalseHeader) {
 }
 
 TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
-  wire.readings();
+  Connected wire(100ms);
   wire.spoil = [&](Bytes& reply, Duration& delay) {
     if (!is_reply(reply, 50, 13)) return;
     wire.deliver(Bytes(reply.begin() + 5, reply.end()), 16ms);
@@ -210,8 +185,7 @@ TEST(Resync, WaitsForTheSecondHalfOfAFrameFromASlowAdapter) {
 }
 
 TEST(Timeouts, FollowTheMeasuredRoundTripBetweenTheirBounds) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   EXPECT_EQ(wire.session.reply_timeout(), 40ms) << "a quick module: the shortest";
   wire.latency = 60ms;
   wire.run_for(3s);
@@ -226,10 +200,7 @@ TEST(Timeouts, FollowTheMeasuredRoundTripBetweenTheirBounds) {
 }
 
 TEST(Timeouts, OfALostReplyCostOneGapOfThatEntryAndNoOther) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(500ms);
-  wire.readings();
+  Connected wire(500ms);
   bool lost = false;
   wire.spoil = [&](Bytes& reply, Duration&) {
     if (!std::exchange(lost, lost || is_reply(reply, 50, 13)) && is_reply(reply, 50, 13)) reply.clear();

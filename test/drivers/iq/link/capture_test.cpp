@@ -57,9 +57,13 @@ fake::Bytes all_bytes(const std::vector<Captured>& records, Direction direction)
   return bytes;
 }
 
-TEST(Capture, KeepsBytesTimesAndDirections) {
+class CaptureOnDisk : public testing::Test {
+ protected:
   const TemporaryFolder folder;
-  const std::string path = (folder.path() / "line.iqc").string();
+  const std::string path = folder / "line.iqc";
+};
+
+TEST_F(CaptureOnDisk, KeepsBytesTimesAndDirections) {
   {
     Capture capture(path);
     capture.add(Direction::sent, fake::Bytes{0x55, 0x02}, 5ns);
@@ -77,9 +81,7 @@ TEST(Capture, KeepsBytesTimesAndDirections) {
 
 TEST(Capture, RefusesAFolderThatIsNotThere) { EXPECT_THROW(Capture("/no/such/folder/line.iqc"), DeviceError); }
 
-TEST(Capture, MarksWhatItCouldNotTake) {
-  const TemporaryFolder folder;
-  const std::string path = (folder.path() / "line.iqc").string();
+TEST_F(CaptureOnDisk, MarksWhatItCouldNotTake) {
   {
     Capture capture(path);
     const fake::Bytes too_much(5 << 20, 0);
@@ -92,9 +94,7 @@ TEST(Capture, MarksWhatItCouldNotTake) {
   EXPECT_EQ(records[1].bytes, fake::Bytes{1});
 }
 
-TEST(Capture, OfAMotorGoesThroughTheParserBitByBit) {
-  const TemporaryFolder folder;
-  const std::string path = (folder.path() / "line.iqc").string();
+TEST_F(CaptureOnDisk, OfAMotorGoesThroughTheParserBitByBit) {
   Counters counters;
   fake::ModuleOnALine line;
   {

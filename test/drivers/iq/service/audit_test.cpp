@@ -3,6 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+#include <optional>
+#include <string_view>
+#include <vector>
+
 #include "test/drivers/iq/fake_dialogue.hpp"
 
 namespace kphi::iq {
@@ -10,7 +16,6 @@ namespace audit_test {
 
 using fake::FakeDialogue;
 using testing::Contains;
-using testing::Each;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -72,17 +77,27 @@ TEST(IqAudit, AsksNothingThatCannotBeRead) {
   for (const Entry* asked : module.asked) EXPECT_TRUE(asked->allows(Access::get)) << asked->path;
 }
 
-void become_old(std::map<const Entry*, double>& values) {
-  for (auto it = values.begin(); it != values.end();) {
-    it = it->first->type == Client::coil_temperature_estimator ? values.erase(it) : std::next(it);
+/// What a module tells instead; nothing: it lacks the entry.
+using Told = std::vector<std::pair<std::string_view, std::optional<double>>>;
+
+void tell(FakeDialogue& module, const Told& told) {
+  for (const auto& [path, value] : told) {
+    ASSERT_NE(find(path), nullptr) << path;
+    module.values.erase(find(path));
+    if (value) module.values[find(path)] = *value;
   }
-  values[&entry<"temperature_estimator.temp">] = 30;
-  values[&entry<"temperature_estimator.derate">] = 65536;
+}
+
+/// Of a firmware with the older estimator of the coil's temperature.
+Told old_coil(std::optional<double> celsius) {
+  return {{"coil_temperature_estimator.t_coil", {}}, {"coil_temperature_estimator.otw", {}},
+          {"coil_temperature_estimator.otlo", {}},   {"coil_temperature_estimator.derate", {}},
+          {"temperature_estimator.temp", celsius},   {"temperature_estimator.derate", 65536}};
 }
 
 TEST(IqAudit, ReadsTheCoilOfOldFirmwareFromTheClientItHas) {
   FakeDialogue module;
-  become_old(module.values);
+  tell(module, old_coil(30));
   const AuditRecord record = read_audit(module.ask(), false);
   EXPECT_EQ(record.coil_temperature_client(), 77);
   EXPECT_EQ(record.value<"temperature_estimator.temp">(), 30);
@@ -91,160 +106,96 @@ TEST(IqAudit, ReadsTheCoilOfOldFirmwareFromTheClientItHas) {
   EXPECT_EQ(findings[0].severity, Severity::note);
 }
 
-struct Case {
-  const char* name;
-  void (*spoil)(std::map<const Entry*, double>&, Intention&);
-  Severity severity;
-  const char* what;
-  const char* next_move;
-};
+using enum Severity;
 
-class IqAuditOf : public testing::TestWithParam<Case> {};
-
-TEST_P(IqAuditOf, NamesWhatIsWrongAndWhatToDo) {
+/// The one finding about a good module that tells something else, or is to do something else.
+void finds(const char* name, const Told& told, Severity severity, const char* what, const char* next_move,
+           const std::function<void(Intention&)>& intend = {}) {
+  SCOPED_TRACE(name);
   FakeDialogue module;
+  tell(module, told);
   Intention intention = paper();
-  GetParam().spoil(module.values, intention);
+  if (intend) intend(intention);
   const std::vector<Finding> findings = audit(read_audit(module.ask(), true), intention);
-  ASSERT_EQ(findings.size(), 1u) << findings.size();
-  EXPECT_EQ(findings[0].severity, GetParam().severity);
-  EXPECT_THAT(findings[0].what, HasSubstr(GetParam().what));
-  EXPECT_THAT(findings[0].next_move, HasSubstr(GetParam().next_move));
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].severity, severity);
+  EXPECT_THAT(findings[0].what, HasSubstr(what));
+  EXPECT_THAT(findings[0].next_move, HasSubstr(next_move));
 }
 
-using Values = std::map<const Entry*, double>;
-
-template <Path path>
-void set(Values& values, double value) {
-  values[&entry<path>] = value;
+TEST(IqAudit, NamesWhatIsWrongAndWhatToDo) {
+  finds("UntoldEssentials", {{"brushless_drive.volts_limit", {}}, {"system_control.hardware_version", {}}}, fault,
+        "no answer from the module for hardware_version, volts_limit", "firmware");
+  finds("OtherModule", {}, fault, "module 002300064d4b501120343353, not ffff", "clock gain",
+        [](Intention& i) { i.uid = "ffff"; });
+  finds("ServoFirmware", {{"system_control.firmware_version", 0x00200020}}, fault, "servo 0.0.32, not a speed firmware",
+        "load speed firmware");
+  finds("OtherHardware", {{"system_control.hardware_version", 0x00020100}}, fault, "type 2.1 batch 0, not a 2306",
+        "connect the 2306");
+  finds("OtherElectronics", {{"system_control.electronics_version", 0x00040000}}, warning, "type 4.0",
+        "intended module");
+  finds("OldFirmware", {{"system_control.firmware_version", 0x0010001F}}, warning, "speed 0.0.31 is older than 0.0.32",
+        "update");
+  finds("FaultNow", {{"power_safety.fault_now", 0x42}}, fault, "input voltage, coil temperature", "remove the cause");
+  finds("FaultLatched", {{"power_safety.fault_ever", 0x10}}, fault,
+        "latched, the module stays in safe mode: motor current", "fault_ever to 0");
+  finds("FaultOnce", {{"power_safety.fault_ever", 1}, {"power_safety.fault_latching", {}}}, warning,
+        "was last cleared: under-voltage", "fault_ever to 0");
+  finds("NotLatching", {{"power_safety.fault_latching", 0}}, warning, "do not latch", "fault_latching to 1");
+  finds("RunAwayBySupplysMaximum", {}, fault, "volts_limit 27 V is not above the supply's 27 V: the motor may run away",
+        "raise", [](Intention& i) { i.supply_voltage_max_v = 27; });
+  finds("RunAwayByVoltageNow", {{"brushless_drive.volts_limit", 12}, {"brushless_drive.v_max_start", 11}}, fault,
+        "volts_limit 12 V is not above the supply's 12 V", "raise", [](Intention& i) { i.supply_voltage_max_v = 0; });
+  finds("RunAwayByNaN", {{"brushless_drive.volts_limit", std::nan("")}, {"brushless_drive.v_max_start", {}}}, fault,
+        "volts_limit nan V is not above", "raise");
+  finds("LateRegenerationLimit", {{"brushless_drive.v_max_start", 28}}, warning,
+        "v_max_start 28 V is above volts_limit 27 V", "between");
+  finds("LowInputLimit", {{"power_safety.volt_input_high", 15}}, warning, "trips at 15 V, the supply may reach 16 V",
+        "lower the supply");
+  finds("LongTimeout", {{"propeller_motor_control.timeout", 10}}, fault, "timeout is 10 s, the limit 1 s",
+        "timeout to 0.5");
+  finds("BrakingTimeout", {{"propeller_motor_control.timeout_behavior", 2}}, fault, "instead of coasting",
+        "timeout_behavior to 0");
+  finds("BrakingDisarm", {{"propeller_motor_control.timeout_meaning", 1}, {"arming_handler.disarm_behavior", 1}}, fault,
+        "runs its disarm behaviour", "timeout_meaning to 0");
+  finds("UntoldDisarm", {{"propeller_motor_control.timeout_meaning", 1}, {"arming_handler.disarm_behavior", {}}}, fault,
+        "runs its disarm behaviour", "timeout_meaning to 0");
+  finds("Song", {{"propeller_motor_control.timeout_song_option", 2}}, warning, "plays its song",
+        "timeout_song_option to 0");
+  finds("FixedTimeoutBehavior", {{"propeller_motor_control.timeout_behavior", {}}}, warning,
+        "coasts and plays its song", "update");
+  finds("HobbyInput", {{"hobby_input.allowed_protocols", 255}}, fault, "hobby input is enabled (allowed_protocols 255)",
+        "to 254");
+  finds("PolePairs", {{"brushless_drive.motor_pole_pairs", 6}}, warning, "motor_pole_pairs is 6, a 2306 has 7",
+        "correct");
+  finds("Kv", {{"brushless_drive.motor_Kv", 220}}, warning, "motor_Kv is 220 RPM/V", "correct");
+  finds("HighCurrent", {{"brushless_drive.motor_I_max", 60}}, warning, "motor_I_max is 60 A", "lower");
+  finds("Redline", {{"brushless_drive.motor_redline_start", 1900}}, warning,
+        "derates above 1900 rad/s (redline), the fastest step needs 2000 rad/s", "top speed");
+  finds("CoilLimit", {{"coil_temperature_estimator.otw", 90}}, warning,
+        "derates above a coil temperature of 90 °C, the limit is 100 °C", "lower the coil temperature limit");
+  finds("Hot", {{"temperature_monitor_uc.derate", 0.9}}, warning, "already derates", "cool down");
+  finds("NoCoilTemperature", old_coil({}), warning, "no coil temperature", "update");
+  finds("SlowSlew", {{"brushless_drive.slew_enable", 1}, {"brushless_drive.slew_volts_per_second", 50}}, warning,
+        "limited to 50 V/s", "100 or more");
+  finds("Slew", {{"brushless_drive.slew_enable", 1}}, note, "limited to 500 V/s", "");
+  finds("SlowInputFilter", {{"propeller_motor_control.input_filter_fc", 1}}, warning,
+        "input_filter_fc is 1 Hz: a new speed reaches the controller only after 0.16 s", "10 Hz or more");
+  finds("UncheckedClock", {}, note, "clock is unchecked", "--clock-gain",
+        [](Intention& i) { i.clock_unchecked = true; });
+  finds("NoControl", {{"propeller_motor_control.velocity_Kp", 0}, {"propeller_motor_control.velocity_Ki", 0}}, warning,
+        "the speed is not controlled", "tune");
+  finds("NoFeedForward", {{"propeller_motor_control.velocity_ff2", 0}}, warning, "velocity_ff2 is unset", "identify");
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    Table, IqAuditOf,
-    testing::Values(
-        Case{"UntoldEssentials",
-             [](Values& v, Intention&) {
-               v.erase(&entry<"brushless_drive.volts_limit">);
-               v.erase(&entry<"system_control.hardware_version">);
-             },
-             Severity::fault, "no answer from the module for hardware_version, volts_limit", "firmware"},
-        Case{"OtherModule", [](Values&, Intention& i) { i.uid = "ffff"; }, Severity::fault,
-             "module 002300064d4b501120343353, not ffff", "clock gain"},
-        Case{"ServoFirmware", [](Values& v, Intention&) { set<"system_control.firmware_version">(v, 0x00200020); },
-             Severity::fault, "servo 0.0.32, not a speed firmware", "load speed firmware"},
-        Case{"OtherHardware", [](Values& v, Intention&) { set<"system_control.hardware_version">(v, 0x00020100); },
-             Severity::fault, "type 2.1 batch 0, not a 2306", "connect the 2306"},
-        Case{"OtherElectronics",
-             [](Values& v, Intention&) { set<"system_control.electronics_version">(v, 0x00040000); }, Severity::warning,
-             "type 4.0", "intended module"},
-        Case{"OldFirmware", [](Values& v, Intention&) { set<"system_control.firmware_version">(v, 0x0010001F); },
-             Severity::warning, "speed 0.0.31 is older than 0.0.32", "update"},
-        Case{"FaultNow", [](Values& v, Intention&) { set<"power_safety.fault_now">(v, 0x42); }, Severity::fault,
-             "input voltage, coil temperature", "remove the cause"},
-        Case{"FaultLatched", [](Values& v, Intention&) { set<"power_safety.fault_ever">(v, 0x10); }, Severity::fault,
-             "latched, the module stays in safe mode: motor current", "fault_ever to 0"},
-        Case{"FaultOnce",
-             [](Values& v, Intention&) {
-               set<"power_safety.fault_ever">(v, 1);
-               v.erase(&entry<"power_safety.fault_latching">);
-             },
-             Severity::warning, "was last cleared: under-voltage", "fault_ever to 0"},
-        Case{"NotLatching", [](Values& v, Intention&) { set<"power_safety.fault_latching">(v, 0); }, Severity::warning,
-             "do not latch", "fault_latching to 1"},
-        Case{"RunAwayBySupplysMaximum", [](Values&, Intention& i) { i.supply_voltage_max_v = 27; }, Severity::fault,
-             "volts_limit 27 V is not above the supply's 27 V: the motor may run away", "raise"},
-        Case{"RunAwayByVoltageNow",
-             [](Values& v, Intention& i) {
-               i.supply_voltage_max_v = 0;
-               set<"brushless_drive.volts_limit">(v, 12);
-               set<"brushless_drive.v_max_start">(v, 11);
-             },
-             Severity::fault, "volts_limit 12 V is not above the supply's 12 V", "raise"},
-        Case{"RunAwayByNaN",
-             [](Values& v, Intention&) {
-               set<"brushless_drive.volts_limit">(v, std::nan(""));
-               v.erase(&entry<"brushless_drive.v_max_start">);
-             },
-             Severity::fault, "volts_limit nan V is not above", "raise"},
-        Case{"LateRegenerationLimit", [](Values& v, Intention&) { set<"brushless_drive.v_max_start">(v, 28); },
-             Severity::warning, "v_max_start 28 V is above volts_limit 27 V", "between"},
-        Case{"LowInputLimit", [](Values& v, Intention&) { set<"power_safety.volt_input_high">(v, 15); },
-             Severity::warning, "trips at 15 V, the supply may reach 16 V", "lower the supply"},
-        Case{"LongTimeout", [](Values& v, Intention&) { set<"propeller_motor_control.timeout">(v, 10); },
-             Severity::fault, "timeout is 10 s, the limit 1 s", "timeout to 0.5"},
-        Case{"BrakingTimeout", [](Values& v, Intention&) { set<"propeller_motor_control.timeout_behavior">(v, 2); },
-             Severity::fault, "instead of coasting", "timeout_behavior to 0"},
-        Case{"BrakingDisarm",
-             [](Values& v, Intention&) {
-               set<"propeller_motor_control.timeout_meaning">(v, 1);
-               set<"arming_handler.disarm_behavior">(v, 1);
-             },
-             Severity::fault, "runs its disarm behaviour", "timeout_meaning to 0"},
-        Case{"UntoldDisarm",
-             [](Values& v, Intention&) {
-               set<"propeller_motor_control.timeout_meaning">(v, 1);
-               v.erase(&entry<"arming_handler.disarm_behavior">);
-             },
-             Severity::fault, "runs its disarm behaviour", "timeout_meaning to 0"},
-        Case{"Song", [](Values& v, Intention&) { set<"propeller_motor_control.timeout_song_option">(v, 2); },
-             Severity::warning, "plays its song", "timeout_song_option to 0"},
-        Case{"FixedTimeoutBehavior",
-             [](Values& v, Intention&) { v.erase(&entry<"propeller_motor_control.timeout_behavior">); },
-             Severity::warning, "coasts and plays its song", "update"},
-        Case{"HobbyInput", [](Values& v, Intention&) { set<"hobby_input.allowed_protocols">(v, 255); }, Severity::fault,
-             "hobby input is enabled (allowed_protocols 255)", "to 254"},
-        Case{"PolePairs", [](Values& v, Intention&) { set<"brushless_drive.motor_pole_pairs">(v, 6); },
-             Severity::warning, "motor_pole_pairs is 6, a 2306 has 7", "correct"},
-        Case{"Kv", [](Values& v, Intention&) { set<"brushless_drive.motor_Kv">(v, 220); }, Severity::warning,
-             "motor_Kv is 220 RPM/V", "correct"},
-        Case{"HighCurrent", [](Values& v, Intention&) { set<"brushless_drive.motor_I_max">(v, 60); }, Severity::warning,
-             "motor_I_max is 60 A", "lower"},
-        Case{"Redline", [](Values& v, Intention&) { set<"brushless_drive.motor_redline_start">(v, 1900); },
-             Severity::warning, "derates above 1900 rad/s (redline), the fastest step needs 2000 rad/s", "top speed"},
-        Case{"CoilLimit", [](Values& v, Intention&) { set<"coil_temperature_estimator.otw">(v, 90); },
-             Severity::warning, "derates above a coil temperature of 90 °C, the limit is 100 °C",
-             "lower the coil temperature limit"},
-        Case{"Hot", [](Values& v, Intention&) { set<"temperature_monitor_uc.derate">(v, 0.9); }, Severity::warning,
-             "already derates", "cool down"},
-        Case{"NoCoilTemperature",
-             [](Values& v, Intention&) {
-               become_old(v);
-               v.erase(&entry<"temperature_estimator.temp">);
-             },
-             Severity::warning, "no coil temperature", "update"},
-        Case{"SlowSlew",
-             [](Values& v, Intention&) {
-               set<"brushless_drive.slew_enable">(v, 1);
-               set<"brushless_drive.slew_volts_per_second">(v, 50);
-             },
-             Severity::warning, "limited to 50 V/s", "100 or more"},
-        Case{"Slew", [](Values& v, Intention&) { set<"brushless_drive.slew_enable">(v, 1); }, Severity::note,
-             "limited to 500 V/s", ""},
-        Case{"SlowInputFilter", [](Values& v, Intention&) { set<"propeller_motor_control.input_filter_fc">(v, 1); },
-             Severity::warning, "input_filter_fc is 1 Hz: a new speed reaches the controller only after 0.16 s",
-             "10 Hz or more"},
-        Case{"UncheckedClock", [](Values&, Intention& i) { i.clock_unchecked = true; }, Severity::note,
-             "clock is unchecked", "--clock-gain"},
-        Case{"NoControl",
-             [](Values& v, Intention&) {
-               set<"propeller_motor_control.velocity_Kp">(v, 0);
-               set<"propeller_motor_control.velocity_Ki">(v, 0);
-             },
-             Severity::warning, "the speed is not controlled", "tune"},
-        Case{"NoFeedForward", [](Values& v, Intention&) { set<"propeller_motor_control.velocity_ff2">(v, 0); },
-             Severity::warning, "velocity_ff2 is unset", "identify"}),
-    [](const testing::TestParamInfo<Case>& one) { return one.param.name; });
 
 TEST(IqAudit, PutsTheWorstFirst) {
   FakeDialogue module;
-  set<"brushless_drive.slew_enable">(module.values, 1);
-  set<"brushless_drive.motor_Kv">(module.values, 1000);
-  set<"hobby_input.allowed_protocols">(module.values, 255);
+  tell(
+      module,
+      {{"brushless_drive.slew_enable", 1}, {"brushless_drive.motor_Kv", 1000}, {"hobby_input.allowed_protocols", 255}});
   const auto findings = audit(read_audit(module.ask(), true), paper());
-  ASSERT_EQ(findings.size(), 3u);
-  EXPECT_EQ(findings[0].severity, Severity::fault);
-  EXPECT_EQ(findings[1].severity, Severity::warning);
-  EXPECT_EQ(findings[2].severity, Severity::note);
+  const auto is = [](Severity severity) { return testing::Field(&Finding::severity, severity); };
+  EXPECT_THAT(findings, testing::ElementsAre(is(fault), is(warning), is(note)));
 }
 
 TEST(IqAudit, RefusesAModuleThatSaysNothing) {

@@ -13,6 +13,7 @@ namespace probe_test {
 using fake::FakeDialogue;
 using fake::Module;
 using fake::ModuleOnALine;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -31,8 +32,7 @@ bool only_coasted(ModuleOnALine& line) {
 
 TEST(Search, FindsAModuleAtAnyRateAndLeavesItCoasting) {
   for (const unsigned baud : {115200u, 921600u, 57600u, 9600u}) {
-    ModuleOnALine line;
-    line.with([&](Module& m) { m.baud = baud; });
+    ModuleOnALine line([&](Module& m) { m.baud = baud; });
     EXPECT_EQ(find_baud(line.device(), 0), baud);
     EXPECT_TRUE(line.left_coasting());
     EXPECT_TRUE(only_coasted(line));
@@ -40,8 +40,7 @@ TEST(Search, FindsAModuleAtAnyRateAndLeavesItCoasting) {
 }
 
 TEST(Search, FindsTheIdsOfALine) {
-  ModuleOnALine line;
-  line.with([](Module& m) { give_id(m, 5); });
+  ModuleOnALine line([](Module& m) { give_id(m, 5); });
   line.with_others([](std::vector<Module>& others) {
     others.resize(2);
     give_id(others[1], 62);
@@ -52,8 +51,7 @@ TEST(Search, FindsTheIdsOfALine) {
 }
 
 TEST(Search, FindsNothingOnADeadLine) {
-  ModuleOnALine line;
-  line.with([](Module& m) { m.mute = true; });
+  ModuleOnALine line([](Module& m) { m.mute = true; });
   EXPECT_EQ(find_baud(line.device(), 0), std::nullopt);
   EXPECT_TRUE(find_ids(line.device(), 115200).empty());
 }
@@ -72,8 +70,7 @@ std::vector<std::string> findings_of(const SerialLine& line, const ProbeSettings
 }
 
 TEST(Probe, SaysUnderWhichIdTheModuleAnswers) {
-  ModuleOnALine line;
-  line.with([](Module& m) { give_id(m, 7); });
+  ModuleOnALine line([](Module& m) { give_id(m, 7); });
   const auto lines = findings_of({line.device(), 115200, 0});
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_EQ(lines[1], "fault: id 7 answers at 115200 baud, not id 0; write module_id: 7 under iq: in the bench file");
@@ -81,31 +78,30 @@ TEST(Probe, SaysUnderWhichIdTheModuleAnswers) {
 }
 
 TEST(Probe, SaysWhereItSearchedInVain) {
-  ModuleOnALine line;
-  line.with([](Module& m) { m.mute = true; });
+  ModuleOnALine line([](Module& m) { m.mute = true; });
   const auto lines = findings_of({line.device(), 115200, 0});
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_THAT(lines[1], HasSubstr("note: searched for it at 115200, 921600, 1000000"));
 }
 
-TEST(Probe, SearchesOnlyWhenAskedAndOnlyForASilentModule) {
-  ModuleOnALine silent, stubborn;
-  silent.with([](Module& m) { m.mute = true; });
-  ProbeSettings no_search;
-  no_search.search = false;
-  EXPECT_EQ(findings_of({silent.device(), 115200, 0}, no_search).size(), 1u);
-  stubborn.with([](Module& m) {
+TEST(Probe, SearchesOnlyWhenAskedAndOnlyForASilentModuleAndSaysWhyNobodyAnswers) {
+  ModuleOnALine silent([](Module& m) { m.mute = true; });
+  ModuleOnALine stubborn([](Module& m) {
     m.ignore_sets = true;
     m.values[{50, 0}] = fake::u8(3);
   });
-  EXPECT_EQ(findings_of({stubborn.device(), 115200, 0}).size(), 1u) << "it answers, and does not coast";
-  EXPECT_TRUE(stubborn.left_coasting());
+  ProbeSettings no_search;
+  no_search.search = false;
+  EXPECT_THAT(findings_of({silent.device(), 115200, 0}, no_search), ElementsAre(HasSubstr("nothing was received")));
+  EXPECT_THAT(findings_of({stubborn.device(), 115200, 0}),
+              ElementsAre(HasSubstr("coast not confirmed: the drive mode last read 3")))
+      << "it answers, and does not coast";
+  EXPECT_TRUE(stubborn.left_coasting()) << "the last thing it heard is a coast";
   EXPECT_EQ(findings_of({"/dev/no_such_tty", 115200, 0}).size(), 1u);
 }
 
 TEST(Probe, CoastsBeforeItAsksAnythingElseAndLeavesTheMotorCoasting) {
-  ModuleOnALine line;
-  line.with([](Module& m) { m.values[{50, 0}] = fake::u8(3); });  // left spinning by a program that died
+  ModuleOnALine line([](Module& m) { m.values[{50, 0}] = fake::u8(3); });  // left spinning by a program that died
   EXPECT_TRUE(probe({line.device(), 115200, 0}, kClock).answers());
   line.with([](Module& m) {
     ASSERT_GE(m.heard.size(), 2u);
@@ -129,22 +125,6 @@ TEST(Probe, ReadsAWholeAudit) {
   EXPECT_EQ(found.record->uid(), "111111112222222233333333");
   EXPECT_EQ(found.record->firmware()->text(), "speed 0.0.32");
   EXPECT_EQ(found.record->coil_temperature_client(), 83);
-}
-
-TEST(Probe, SaysWhyNobodyAnswers) {
-  ProbeSettings no_search;
-  no_search.search = false;
-  ModuleOnALine mute, stubborn;
-  mute.with([](Module& m) { m.mute = true; });
-  EXPECT_THAT(findings_of({mute.device(), 115200, 0}, no_search).at(0), HasSubstr("nothing was received"));
-  stubborn.with([](Module& m) {
-    m.values[{50, 0}] = fake::u8(3);
-    m.silent.insert({52, 2});
-    m.ignore_sets = true;
-  });
-  EXPECT_THAT(findings_of({stubborn.device(), 115200, 0}, no_search).at(0),
-              HasSubstr("coast not confirmed: the drive mode last read 3"));
-  EXPECT_TRUE(stubborn.left_coasting()) << "the last thing it heard is a coast";
 }
 
 constexpr const Entry& kTimeout = entry<"propeller_motor_control.timeout">;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include "test/drivers/iq/wire.hpp"
@@ -12,20 +14,19 @@ namespace connecting_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
+using fake::Connected;
 using fake::State;
 using fake::Wire;
 
 TEST(Connecting, CoastsBeforeAnythingElse) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   ASSERT_FALSE(wire.module.heard.empty());
   EXPECT_TRUE(wire.module.heard[0].is_coast());
   EXPECT_EQ(fake::hex(std::span(wire.batches[0].second).first(7)), "55 02 34 02 01 8E 06");
 }
 
 TEST(Connecting, ReadsWhoTheModuleIs) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   const AuditRecord& identity = wire.session.identity();
   EXPECT_EQ(identity.value<"brushless_drive.motor_pole_pairs">(), 7);
   EXPECT_EQ(identity.value<"brushless_drive.motor_Kv">(), 2200);
@@ -35,8 +36,7 @@ TEST(Connecting, ReadsWhoTheModuleIs) {
 }
 
 TEST(Connecting, MakesTheModuleCoastByItselfWithoutASong) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   EXPECT_EQ(fake::to_f32(wire.module.values.at({52, 15})), 0.5f);
   EXPECT_EQ(wire.module.values.at({52, 18}), fake::u8(0));
   EXPECT_EQ(wire.module.values.at({52, 19}), fake::u8(0));
@@ -48,9 +48,7 @@ TEST(Connecting, FailsWhenTheTimeoutIsNotAccepted) {
     Wire wire;
     wire.module.read_only = {{52, sub}};
     wire.session.connect(wire.now);
-    ASSERT_TRUE(wire.run_to_state(State::failed, 3s)) << sub;
-    EXPECT_NE(wire.session.failure().find("the motor would keep turning if this computer stopped"), std::string::npos)
-        << wire.session.failure();
+    wire.expect_failure("the motor would keep turning if this computer stopped", 3s);
     EXPECT_TRUE(wire.module.last_motion()->is_coast());
   }
 }
@@ -79,16 +77,14 @@ TEST(Connecting, RepeatsASetThatWasLost) {
 TEST(Connecting, AcceptsOldFirmwareWithoutTimeoutBehaviour) {
   Wire wire;
   wire.module.silent = {{77, 0}, {52, 18}, {52, 19}};
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::ready, 10s)) << wire.session.failure();
+  wire.connect(10s);
   EXPECT_NE(wire.session.identity().summary().find("old firmware: plays its song"), std::string::npos);
 }
 
 TEST(Connecting, TakesTheCoilTemperatureOfOldFirmware) {
   Wire wire;
   wire.module.silent = {{83, 0}};
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  wire.connect(3s);
   EXPECT_EQ(wire.session.identity().coil_temperature_client(), 77);
   wire.readings();
   wire.run_for(1s);
@@ -100,50 +96,37 @@ TEST(Connecting, TakesTheCoilTemperatureOfOldFirmware) {
 TEST(Connecting, GoesOnWithoutACoilTemperature) {
   Wire wire;
   wire.module.silent = {{83, 0}, {77, 0}};
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  wire.connect(3s);
   wire.run_for(1s);
   EXPECT_TRUE(wire.values(MotorChannel::coil_temperature).empty());
   EXPECT_EQ(wire.session.state(), State::ready);
 }
 
-TEST(Connecting, FailsWithinASecondWhenNothingAnswers) {
-  Wire wire;
-  wire.module.mute = true;
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
-  EXPECT_EQ(wire.session.failure(), "nothing was received");
-}
-
-TEST(Connecting, SaysWhenOnlyGarbageComes) {
-  Wire wire;
-  wire.spoil = [](Bytes& reply, Duration&) { reply = {0x00, 0xE6, 0x55, 0x80}; };
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
-  EXPECT_EQ(wire.session.failure(), "bytes were received, but no valid packet");
-}
-
-TEST(Connecting, SaysWhenAnotherModuleAnswers) {
-  Wire wire;
-  wire.spoil = [](Bytes& reply, Duration&) { reply = fake::message(50, 0, 3, 5, fake::u8(5)); };
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
-  EXPECT_EQ(wire.session.failure(), "only modules with another id answer");
-  EXPECT_GT(wire.session.counters().wrong_module, 0u);
-}
-
-TEST(Connecting, FailsWhenTheModuleDoesNotCoast) {
-  Wire wire;
-  wire.module.ignore_sets = true;
-  wire.module.values[{50, 0}] = fake::u8(3);
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 2s));
-  EXPECT_NE(wire.session.failure().find("coast not confirmed"), std::string::npos);
+TEST(Connecting, FailsWithinASecondOrTwoAndSaysWhy) {
+  const auto fails = [](const std::string& words, Duration limit, const std::function<void(Wire&)>& spoil) {
+    Wire wire;
+    spoil(wire);
+    wire.session.connect(wire.now);
+    EXPECT_TRUE(wire.run_to_state(State::failed, limit)) << words;
+    EXPECT_EQ(wire.session.failure(), words);
+    return wire.session.counters();
+  };
+  fails("nothing was received", 1s, [](Wire& wire) { wire.module.mute = true; });
+  fails("bytes were received, but no valid packet", 1s, [](Wire& wire) {
+    wire.spoil = [](Bytes& reply, Duration&) { reply = {0x00, 0xE6, 0x55, 0x80}; };
+  });
+  const Counters counters = fails("only modules with another id answer", 1s, [](Wire& wire) {
+    wire.spoil = [](Bytes& reply, Duration&) { reply = fake::message(50, 0, 3, 5, fake::u8(5)); };
+  });
+  EXPECT_GT(counters.wrong_module, 0u);
+  fails("coast not confirmed: the drive mode last read 3", 2s, [](Wire& wire) {
+    wire.module.ignore_sets = true;
+    wire.module.values[{50, 0}] = fake::u8(3);
+  });
 }
 
 TEST(Reconnecting, SendsNothingOfBefore) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.session.spin_at(RadPerSec(700), wire.now);
   wire.session.sent(3);  // the rest has not left when the plug is pulled
   wire.session.fail(EventKind::motor_port_lost, "unplugged", wire.now);
@@ -156,16 +139,13 @@ TEST(Reconnecting, SendsNothingOfBefore) {
 }
 
 TEST(Reconnecting, RefusesAnotherModuleBeforeTellingItAnythingButCoast) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.session.fail(EventKind::motor_port_lost, "unplugged", wire.now);
   wire.module.heard.clear();
   wire.module.values[{5, 6}] = fake::u32(0x99999999);
   wire.session.connect_anew(wire.now);
   wire.flush();
-  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
-  EXPECT_NE(wire.session.failure().find("another module answers, uid 111111112222222299999999"), std::string::npos)
-      << wire.session.failure();
+  wire.expect_failure("another module answers, uid 111111112222222299999999");
   EXPECT_EQ(wire.session.take_events().back().kind, EventKind::motor_another_module);
   EXPECT_EQ(wire.module.count([](const auto& m) { return m.access == 1 && !m.is_coast(); }), 0u);
 }
@@ -177,8 +157,7 @@ TEST(OldFirmware, AnswersForItsSystemOnIdZero) {
   wire.module.id = 7;
   wire.module.values[{5, 14}] = fake::u8(7);
   wire.module.old_system_control = true;
-  wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::ready, 3s)) << wire.session.failure();
+  wire.connect(3s);
   EXPECT_EQ(wire.session.identity().uid(), "111111112222222233333333");
   wire.run_for(1s);
   EXPECT_EQ(wire.session.counters().wrong_module, 0u);
@@ -190,13 +169,11 @@ TEST(OldFirmware, IsNotTakenForModuleZeroWhenItsOtherClientsHaveAnotherId) {
   Wire wire;
   wire.module.values[{5, 14}] = fake::u8(7);
   wire.session.connect(wire.now);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 1s));
-  EXPECT_NE(wire.session.failure().find("set module_id to 7"), std::string::npos) << wire.session.failure();
+  wire.expect_failure("set module_id to 7");
 }
 
 TEST(Inquiries, AreAnsweredBetweenThePolls) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.session.inquire({{find("brushless_drive.motor_Kv"), {}},
                         {find("power_monitor.volts"), {}},
                         {find("coil_temperature_estimator.otw"), {}},
@@ -227,8 +204,7 @@ TEST(Inquiries, TellWhenASettingIsNotTakenBitByBit) {
 }
 
 TEST(Inquiries, NeverMoveSaveEraseOrRename) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   for (const char* path : {"propeller_motor_control.ctrl_velocity", "brushless_drive.motor_pole_pairs",
                            "system_control.module_id", "arming_handler.motor_armed", "power_monitor.volts"}) {
     const Entry* entry = find(path);
@@ -243,43 +219,35 @@ TEST(Inquiries, NeverMoveSaveEraseOrRename) {
 
 constexpr const Entry& kTimeout = entry<"propeller_motor_control.timeout">;
 
-TEST(OpenInquiry, IsOverWithTheFirstAnswerToAQuestion) {
-  OpenInquiry open({&kTimeout, {}});
-  EXPECT_FALSE(open.done());
-  open.take(std::nullopt);
-  EXPECT_FALSE(open.done());
-  open.take(0.7);
+/// Takes each answer and is over with the last of them.
+Reply reply_after(OpenInquiry open, const std::vector<std::optional<double>>& answers) {
+  for (const std::optional<double>& answer : answers) {
+    EXPECT_FALSE(open.done());
+    open.take(answer);
+  }
   EXPECT_TRUE(open.done());
-  EXPECT_EQ(open.reply().value, 0.7);
-  EXPECT_FALSE(open.reply().accepted) << "nothing was set";
+  return open.reply();
+}
+
+TEST(OpenInquiry, IsOverWithTheFirstAnswerToAQuestion) {
+  const Reply reply = reply_after(OpenInquiry({&kTimeout, {}}), {std::nullopt, 0.7});
+  EXPECT_EQ(reply.value, 0.7);
+  EXPECT_FALSE(reply.accepted) << "nothing was set";
 }
 
 TEST(OpenInquiry, IsPutThreeTimesToAModuleThatStaysSilent) {
-  OpenInquiry open({&kTimeout, 0.5});
-  for (int i = 0; i < OpenInquiry::kAttempts; ++i) {
-    EXPECT_FALSE(open.done());
-    open.take(std::nullopt);
-  }
-  EXPECT_TRUE(open.done());
-  EXPECT_EQ(open.reply().value, std::nullopt);
+  const std::vector<std::optional<double>> silence(OpenInquiry::kAttempts);
+  EXPECT_EQ(reply_after(OpenInquiry({&kTimeout, 0.5}), silence).value, std::nullopt);
 }
 
 TEST(OpenInquiry, SetsUntilItReadsBackBitByBit) {
-  OpenInquiry open({&kTimeout, 0.5});
-  open.take(std::nextafterf(0.5f, 1.0f));
-  EXPECT_FALSE(open.done());
-  open.take(0.5);
-  EXPECT_TRUE(open.done());
-  EXPECT_TRUE(open.reply().accepted);
+  EXPECT_TRUE(reply_after(OpenInquiry({&kTimeout, 0.5}), {std::nextafterf(0.5f, 1.0f), 0.5}).accepted);
 }
 
 TEST(OpenInquiry, RemembersWhatAModuleInsistsOn) {
-  OpenInquiry open({&kTimeout, 0.5}, 2);
-  open.take(10.0);
-  open.take(std::nullopt);
-  EXPECT_TRUE(open.done());
-  EXPECT_EQ(open.reply().value, 10.0);
-  EXPECT_FALSE(open.reply().accepted);
+  const Reply reply = reply_after(OpenInquiry({&kTimeout, 0.5}, 2), {10.0, std::nullopt});
+  EXPECT_EQ(reply.value, 10.0);
+  EXPECT_FALSE(reply.accepted);
 }
 
 TEST(OpenInquiry, CanBeGivenUp) {

@@ -15,6 +15,7 @@ namespace kphi::iq {
 namespace module_watch_test {
 
 using namespace std::chrono_literals;
+using fake::Connected;
 using fake::Module;
 using fake::State;
 using fake::Wire;
@@ -38,9 +39,8 @@ struct Turning {
     return speeds;
   }
   [[nodiscard]] bool noted(EventKind kind) {
-    for (const StreamEvent& event : wire.session.take_events())
-      if (event.kind == kind) return true;
-    return false;
+    const auto events = wire.session.take_events();
+    return std::any_of(events.begin(), events.end(), [&](const StreamEvent& event) { return event.kind == kind; });
   }
   void let_the_module_go() { wire.module.values[{50, 0}] = fake::u8(5); }
 };
@@ -145,49 +145,40 @@ TEST(Link, CoastsAfterTheComputerSleptAndTakesNoSpeedAnyMore) {
   EXPECT_EQ(line.with([](Module& m) { return m.count([](const auto& h) { return h.is_speed(); }); }), 1u);
 }
 
-struct Restart {
-  const char* name;
-  void (*happen)(fake::Module&);
-};
-
-class EveryRestart : public testing::TestWithParam<Restart> {};
-
-TEST_P(EveryRestart, IsNoticedNamedAndNeverFollowedByMotion) {
-  Wire wire;
-  wire.connect();
-  wire.spin(1000);
-  wire.run_for(600ms);
-  EXPECT_EQ(wire.session.state(), State::ready);
-  (void)wire.session.take_events();
-  const auto speeds = [&] { return wire.module.count([](const auto& m) { return m.is_speed(); }); };
-  const auto before = speeds();
-  GetParam().happen(wire.module);
-  ASSERT_TRUE(wire.run_to_state(State::failed, 300ms));
-  const auto events = wire.session.take_events();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].kind, EventKind::motor_reset);
-  EXPECT_TRUE(ends_a_run(events[0].kind));
-  EXPECT_EQ(wire.session.counters().module_resets, 1u);
-  EXPECT_NE(wire.session.failure().find("restarted by itself"), std::string::npos);
-  wire.run_for(100ms);
-  EXPECT_TRUE(wire.session.coasting());
-  wire.connect();
-  wire.run_for(1s);
-  EXPECT_EQ(speeds(), before);
-  EXPECT_THROW(wire.spin(1000), std::logic_error) << "the owner has not seen it yet";
-  EXPECT_EQ(fake::to_f32(wire.module.values.at({52, 15})), 0.5f) << "its settings are there again";
-  wire.session.rearm();
-  wire.spin(900);
-  EXPECT_EQ(speeds(), before + 1);
+/// Whether its uptime goes backwards or its under-voltage bit is set.
+TEST(EveryRestart, IsNoticedNamedAndNeverFollowedByMotion) {
+  for (const bool by_uptime : {true, false}) {
+    Connected wire;
+    wire.spin(1000);
+    wire.run_for(600ms);
+    EXPECT_EQ(wire.session.state(), State::ready);
+    (void)wire.session.take_events();
+    const auto speeds = [&] { return wire.module.count([](const auto& m) { return m.is_speed(); }); };
+    const auto before = speeds();
+    if (by_uptime) {
+      wire.module.restart();
+    } else {
+      wire.module.values[{84, 1}] = fake::u8(1);
+    }
+    ASSERT_TRUE(wire.run_to_state(State::failed, 300ms)) << by_uptime;
+    const auto events = wire.session.take_events();
+    ASSERT_EQ(events.size(), 1u);
+    EXPECT_EQ(events[0].kind, EventKind::motor_reset);
+    EXPECT_TRUE(ends_a_run(events[0].kind));
+    EXPECT_EQ(wire.session.counters().module_resets, 1u);
+    EXPECT_NE(wire.session.failure().find("restarted by itself"), std::string::npos);
+    wire.run_for(100ms);
+    EXPECT_TRUE(wire.session.coasting());
+    wire.connect();
+    wire.run_for(1s);
+    EXPECT_EQ(speeds(), before);
+    EXPECT_THROW(wire.spin(1000), std::logic_error) << "the owner has not seen it yet";
+    EXPECT_EQ(fake::to_f32(wire.module.values.at({52, 15})), 0.5f) << "its settings are there again";
+    wire.session.rearm();
+    wire.spin(900);
+    EXPECT_EQ(speeds(), before + 1);
+  }
 }
-
-INSTANTIATE_TEST_SUITE_P(Session, EveryRestart,
-                         testing::Values(Restart{"UptimeGoesBackwards", [](fake::Module& m) { m.restart(); }},
-                                         Restart{"UnderVoltageBit",
-                                                 [](fake::Module& m) {
-                                                   m.values[{84, 1}] = fake::u8(1);
-                                                 }}),
-                         [](const auto& restart) { return std::string(restart.param.name); });
 
 TEST(Restarts, AreNotSeenInOtherFaultsNorInBitsOfBefore) {
   Wire wire;
@@ -199,9 +190,7 @@ TEST(Restarts, AreNotSeenInOtherFaultsNorInBitsOfBefore) {
 }
 
 TEST(Restarts, AreNotSeenWhenTheTimeIsSet) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(1s);
+  Connected wire(1s);
   wire.session.inquire({{find("system_control.time"), 0.0}}, wire.now);
   wire.flush();
   wire.run_for(2s);

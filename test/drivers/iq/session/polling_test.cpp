@@ -13,14 +13,13 @@ namespace polling_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
+using fake::Connected;
+using fake::is_reply;
 using fake::State;
 using fake::Wire;
 
-bool is_reply(const Bytes& reply, int type, int sub) { return reply.size() > 4 && reply[2] == type && reply[3] == sub; }
-
 TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.spin(1000);
   wire.run_for(200ms);
   wire.readings();
@@ -45,9 +44,7 @@ TEST(Telemetry, ReadsSpeedEveryCycleAndTheOthersInTurn) {
 }
 
 TEST(Telemetry, AsksBothOfACycleInOneBatch) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(100ms);
+  Connected wire(100ms);
   wire.batches.clear();
   wire.run_for(1s);
   const auto both = [](const auto& batch) { return batch.second.size() >= 14; };
@@ -57,8 +54,7 @@ TEST(Telemetry, AsksBothOfACycleInOneBatch) {
 }
 
 TEST(Telemetry, IsNotDoubledWhenTheModuleIsSlow) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.latency = 55ms;
   wire.run_for(100ms);
   wire.module.heard.clear();
@@ -109,9 +105,7 @@ TEST(Telemetry, StampsTheMiddleLessTheTimeOnTheWire) {
 }
 
 TEST(Telemetry, UncertaintyCoversTheMomentOfMeasurement) {
-  Wire wire;
-  wire.connect();
-  wire.run_for(30ms);
+  Connected wire(30ms);
   std::mt19937 random(5);
   wire.spoil = [&](Bytes& reply, Duration& delay) {
     delay = std::chrono::microseconds(20 + random() % 9000);
@@ -149,10 +143,7 @@ TEST(Telemetry, AsksForAllThatIsWantedInEveryCycle) {
   settings.slow_hz = 10;
   settings.every_cycle = {MotorChannel::speed, MotorChannel::motor_current, MotorChannel::supply_voltage,
                           MotorChannel::supply_current};
-  Wire wire(settings);
-  wire.connect();
-  wire.run_for(100ms);
-  wire.readings();
+  Connected wire(100ms, settings);
   wire.run_for(1s);
   std::map<MotorChannel, int> count;
   for (const MotorReading& reading : wire.readings()) ++count[reading.channel];

@@ -14,6 +14,7 @@ namespace session_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
+using fake::Connected;
 using fake::State;
 using fake::Wire;
 
@@ -26,8 +27,7 @@ TEST(Spinning, IsRefusedUnlessReady) {
 }
 
 TEST(Spinning, IsRefusedBeyondTheRangeAndForNonsense) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   for (const double speed : {3450.1, -3451.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
     EXPECT_THROW(wire.spin(speed), std::invalid_argument);
   }
@@ -35,8 +35,7 @@ TEST(Spinning, IsRefusedBeyondTheRangeAndForNonsense) {
 }
 
 TEST(Spinning, SendsTheSpeedWithItsSign) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.batches.clear();
   wire.spin(-12.5);
   ASSERT_EQ(wire.batches.size(), 1u);
@@ -46,8 +45,7 @@ TEST(Spinning, SendsTheSpeedWithItsSign) {
 }
 
 TEST(Spinning, AtZeroIsACoast) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.spin(500);
   wire.spin(0);
   EXPECT_FALSE(wire.session.spinning());
@@ -68,8 +66,7 @@ TEST(Soak, ARuinedLineNeverBringsAFalseValueAndNeverMotionAfterACoast) {
   for (unsigned seed = 1; seed <= 60; ++seed) {
     std::mt19937 random(seed);
     const auto chance = [&](int in) { return static_cast<int>(random() % static_cast<unsigned>(in)) == 0; };
-    Wire wire;
-    wire.connect();
+    Connected wire;
     wire.spoil = [&](Bytes& reply, Duration& delay) {
       if (chance(20)) reply[random() % reply.size()] ^= static_cast<std::uint8_t>(1u << random() % 8);
       if (chance(30)) reply.resize(random() % reply.size());

@@ -13,20 +13,19 @@ namespace stopping_test {
 
 using namespace std::chrono_literals;
 using fake::Bytes;
+using fake::Connected;
 using fake::State;
 using fake::Wire;
 
-struct SpinningWire : Wire {
-  explicit SpinningWire(double target = 300) {
-    connect();
+struct SpinningWire : Connected {
+  explicit SpinningWire(double target = 300, const Settings& settings = {}) : Connected({}, settings) {
     spin(target);
     run_for(100ms);
   }
 };
 
 TEST(Coasting, GoesBeforeAllThatHasNotBegunToLeave) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.module.heard.clear();
   Session& session = wire.session;
   session.spin_at(RadPerSec(100), wire.now);
@@ -61,8 +60,7 @@ TEST(Coasting, WithdrawsASpeedThatWaitsForCredit) {
 }
 
 TEST(Coasting, IsConfirmedOnlyByAQuestionPutAfterwards) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   wire.spin(300);
   wire.latency = 10ms;
   const auto asked_mode = [&] {
@@ -113,8 +111,7 @@ TEST(Coasting, FallsSilentToAMuteModuleAndSendsNoCoastMeanwhile) {
 }
 
 TEST(Coasting, IsConfirmedAgainAfterEachOrder) {
-  Wire wire;
-  wire.connect();
+  Connected wire;
   ASSERT_TRUE(wire.session.coasting());
   wire.coast();
   EXPECT_FALSE(wire.session.coasting());
@@ -137,8 +134,7 @@ TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
 TEST(Coasting, IsWhatAModuleThatStoppedAnsweringHearsLast) {
   SpinningWire wire;
   wire.module.mute = true;
-  ASSERT_TRUE(wire.run_to_state(State::failed, 3s));
-  EXPECT_NE(wire.session.failure().find("stopped answering"), std::string::npos);
+  wire.expect_failure("stopped answering", 3s);
   EXPECT_TRUE(wire.module.last_motion()->is_coast());
   EXPECT_THROW(wire.spin(300), std::logic_error);
 }
@@ -161,10 +157,7 @@ TEST(Coasting, ReachesAModuleThatWaitsForTheEndOfAFalseHeader) {
   for (const int length : {6, 30, 59}) {
     Settings settings;
     settings.telemetry_hz = 1;  // no polls that would end the header by their bytes
-    Wire wire(settings);
-    wire.connect();
-    wire.spin(1000);
-    wire.run_for(100ms);
+    SpinningWire wire(1000, settings);
     const Bytes noise{0x55, static_cast<std::uint8_t>(length)};
     (void)wire.module.receive(noise);
     wire.coast();
@@ -180,48 +173,45 @@ using Outcome = StopReport::Outcome;
 const StopSettings kRamp{.deceleration = 1000};
 
 /// A module whose propeller needs a while to stand still after a coast.
-struct Propeller {
-  Wire wire;
-  double speed = 0;      ///< rad/s
-  double decay_s = 0.4;  ///< of the speed while coasting; 0: it never slows down
+struct Propeller : Wire {
+  double speed = 0;  ///< rad/s
+  double decay_s;    ///< of the speed while coasting; 0: it never slows down
   Instant last{0};
 
-  Propeller() {
-    wire.module.turns_at_once = false;
-    wire.before_hearing = [this](Instant now) {
-      const bool coasting = wire.module.last_motion() != nullptr && wire.module.last_motion()->is_coast();
-      if (coasting && decay_s > 0) speed *= std::exp(-to_seconds(now - last) / decay_s);
-      if (!coasting && wire.module.last_motion() != nullptr) speed = fake::to_f32(wire.module.last_motion()->data);
-      last = now;
-      wire.module.values[{50, 13}] = fake::f32(speed);
+  explicit Propeller(double target = 0, double decay = 0.4) : decay_s(decay) {
+    module.turns_at_once = false;
+    before_hearing = [this](Instant at) {
+      const bool coasting = module.last_motion() != nullptr && module.last_motion()->is_coast();
+      if (coasting && decay_s > 0) speed *= std::exp(-to_seconds(at - last) / decay_s);
+      if (!coasting && module.last_motion() != nullptr) speed = fake::to_f32(module.last_motion()->data);
+      last = at;
+      module.values[{50, 13}] = fake::f32(speed);
     };
-    wire.connect();
+    connect();
+    if (target != 0) spin(target);
+    run_for(200ms);
   }
-  void spin(double target) {
-    wire.spin(target);
-    wire.run_for(200ms);
-  }
+  void stop(const StopSettings& settings = kRamp) { session.stop(settings, now); }
   std::vector<std::pair<Instant, double>> commands;
   /// Runs until the stop has ended, keeping what was commanded.
   StopReport finish(Duration limit = 20s) {
-    const Instant end = wire.now + limit;
-    std::size_t seen = wire.module.heard.size();
-    while (!wire.session.stop_report() && wire.now < end) {
-      wire.run_for(1ms);
-      for (; seen < wire.module.heard.size(); ++seen) {
-        const auto& heard = wire.module.heard[seen];
-        if (heard.is_speed()) commands.emplace_back(wire.now, fake::to_f32(heard.data));
+    const Instant end = now + limit;
+    std::size_t seen = module.heard.size();
+    while (!session.stop_report() && now < end) {
+      run_for(1ms);
+      for (; seen < module.heard.size(); ++seen) {
+        const auto& heard = module.heard[seen];
+        if (heard.is_speed()) commands.emplace_back(now, fake::to_f32(heard.data));
       }
     }
-    EXPECT_TRUE(wire.session.stop_report().has_value());
-    return wire.session.stop_report().value_or(StopReport{});
+    EXPECT_TRUE(session.stop_report().has_value());
+    return session.stop_report().value_or(StopReport{});
   }
 };
 
 TEST(Stop, CoastsAtOnceUnlessTheSupplySinksWhatARampFeedsBack) {
-  Propeller propeller;
-  propeller.spin(2000);
-  propeller.wire.session.stop({}, propeller.wire.now);
+  Propeller propeller(2000);
+  propeller.stop({});
   const StopReport report = propeller.finish();
   EXPECT_TRUE(propeller.commands.empty());
   EXPECT_EQ(report.outcome, Outcome::standing);
@@ -230,14 +220,13 @@ TEST(Stop, CoastsAtOnceUnlessTheSupplySinksWhatARampFeedsBack) {
 
 TEST(Stop, RampsDownNoFasterThanAllowedAndThenCoasts) {
   for (const double sign : {1.0, -1.0}) {
-    Propeller propeller;
-    propeller.spin(sign * 2000);
-    const Instant asked = propeller.wire.now;
-    propeller.wire.session.stop(kRamp, propeller.wire.now);
+    Propeller propeller(sign * 2000);
+    const Instant asked = propeller.now;
+    propeller.stop();
     const StopReport report = propeller.finish();
     EXPECT_EQ(report.outcome, Outcome::standing) << report.summary();
     EXPECT_TRUE(report.safe());
-    EXPECT_TRUE(propeller.wire.module.last_motion()->is_coast());
+    EXPECT_TRUE(propeller.module.last_motion()->is_coast());
     ASSERT_GT(propeller.commands.size(), 50u) << "in many small steps";
     double before = sign * 2000;
     for (const auto& [time, speed] : propeller.commands) {
@@ -252,24 +241,22 @@ TEST(Stop, RampsDownNoFasterThanAllowedAndThenCoasts) {
     EXPECT_NEAR(to_seconds(*report.time_to_standing), 1.5 + 0.4 * std::log(50), 0.2);
     EXPECT_NEAR(report.speed_at_start, sign * 2000, 1);
     EXPECT_LT(std::abs(report.speed_at_end), 10);
-    EXPECT_GT(propeller.wire.now, asked);
+    EXPECT_GT(propeller.now, asked);
   }
 }
 
 TEST(Stop, StartsFromTheSpeedThatIsTurnedWhenTheMotorIsStillOnItsWayUp) {
-  Propeller propeller;
-  propeller.spin(800);
-  propeller.wire.session.spin_at(RadPerSec(3000), propeller.wire.now);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
-  propeller.wire.flush();
+  Propeller propeller(800);
+  propeller.session.spin_at(RadPerSec(3000), propeller.now);
+  propeller.stop();
+  propeller.flush();
   propeller.finish();
   for (const auto& [time, speed] : propeller.commands) EXPECT_LE(speed, 800);
 }
 
 TEST(Stop, AfterAPlainCoastTellsTheTimesToo) {
-  Propeller propeller;
-  propeller.spin(1000);
-  propeller.wire.coast();
+  Propeller propeller(1000);
+  propeller.coast();
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::standing);
   EXPECT_LT(*report.time_to_coast, 50ms);
@@ -278,21 +265,14 @@ TEST(Stop, AfterAPlainCoastTellsTheTimesToo) {
 }
 
 TEST(Stop, SaysThatTheSpeedWasStillFallingAtTheLimit) {
-  Propeller propeller;
-  propeller.decay_s = 5;
-  propeller.spin(1000);
-  StopSettings settings;
-  settings.limit = 2s;
-  settings.deceleration = 1000;
-  propeller.wire.session.stop(settings, propeller.wire.now);
+  Propeller propeller(1000, 5);
+  propeller.stop({.deceleration = 1000, .limit = 2s});
   EXPECT_EQ(propeller.finish().outcome, Outcome::slowing);
 }
 
 TEST(Stop, SaysThatAMotorTurnsOnAlthoughItCoasts) {
-  Propeller propeller;
-  propeller.decay_s = 0;
-  propeller.spin(1000);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
+  Propeller propeller(1000, 0);
+  propeller.stop();
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::turning);
   EXPECT_FALSE(report.time_to_standing.has_value());
@@ -300,25 +280,23 @@ TEST(Stop, SaysThatAMotorTurnsOnAlthoughItCoasts) {
 }
 
 TEST(Stop, SaysThatTheModuleDoesNotConfirm) {
-  Propeller propeller;
-  propeller.spin(1000);
-  propeller.wire.module.ignore_sets = true;
-  propeller.wire.coast();
+  Propeller propeller(1000);
+  propeller.module.ignore_sets = true;
+  propeller.coast();
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::unconfirmed);
   EXPECT_FALSE(report.safe());
-  EXPECT_EQ(propeller.wire.session.state(), State::failed);
-  EXPECT_LT(propeller.wire.now, 2s) << "long before the stop's limit";
+  EXPECT_EQ(propeller.session.state(), State::failed);
+  EXPECT_LT(propeller.now, 2s) << "long before the stop's limit";
 }
 
 TEST(Stop, CutShortByACoastCoastsAtOnce) {
-  Propeller propeller;
-  propeller.spin(3000);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
-  propeller.wire.run_for(300ms);
-  EXPECT_TRUE(propeller.wire.session.spinning());
-  propeller.wire.coast();
-  EXPECT_TRUE(propeller.wire.module.last_motion()->is_coast());
+  Propeller propeller(3000);
+  propeller.stop();
+  propeller.run_for(300ms);
+  EXPECT_TRUE(propeller.session.spinning());
+  propeller.coast();
+  EXPECT_TRUE(propeller.module.last_motion()->is_coast());
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::standing);
   EXPECT_NEAR(to_seconds(*report.time_to_coast), 0.3, 0.05);
@@ -326,43 +304,39 @@ TEST(Stop, CutShortByACoastCoastsAtOnce) {
 }
 
 TEST(Stop, IsOverruledByANewSpeed) {
-  Propeller propeller;
-  propeller.spin(3000);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
-  propeller.wire.run_for(300ms);
-  propeller.wire.spin(1500);
-  EXPECT_EQ(propeller.wire.session.stop_report()->outcome, Outcome::overruled);
-  EXPECT_FALSE(propeller.wire.session.stop_report()->safe());
-  propeller.wire.run_for(1s);
-  EXPECT_EQ(fake::to_f32(propeller.wire.module.last_motion()->data), 1500);
+  Propeller propeller(3000);
+  propeller.stop();
+  propeller.run_for(300ms);
+  propeller.spin(1500);
+  EXPECT_EQ(propeller.session.stop_report()->outcome, Outcome::overruled);
+  EXPECT_FALSE(propeller.session.stop_report()->safe());
+  propeller.run_for(1s);
+  EXPECT_EQ(fake::to_f32(propeller.module.last_motion()->data), 1500);
 }
 
 TEST(Stop, OfAModuleThatIsLostEndsInACoastAndSaysSo) {
-  Propeller propeller;
-  propeller.spin(2000);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
-  propeller.wire.run_for(100ms);
-  propeller.wire.module.mute = true;
+  Propeller propeller(2000);
+  propeller.stop();
+  propeller.run_for(100ms);
+  propeller.module.mute = true;
   const StopReport report = propeller.finish();
   EXPECT_EQ(report.outcome, Outcome::unconfirmed);
-  EXPECT_TRUE(propeller.wire.module.last_motion()->is_coast());
+  EXPECT_TRUE(propeller.module.last_motion()->is_coast());
 }
 
 TEST(Stop, OfAStandingMotorIsOverAtOnce) {
   Propeller propeller;
-  propeller.wire.run_for(200ms);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
+  propeller.stop();
   EXPECT_EQ(propeller.finish(1s).outcome, Outcome::standing);
 }
 
 TEST(Stop, OfACoastingMotorNeverDrivesIt) {
-  Propeller propeller;
-  propeller.decay_s = 5;
+  Propeller propeller(0, 5);
   propeller.speed = 1500;
-  propeller.wire.run_for(200ms);
-  propeller.wire.session.stop(kRamp, propeller.wire.now);
-  propeller.wire.run_for(1s);
-  EXPECT_EQ(propeller.wire.module.count([](const auto& m) { return m.is_speed(); }), 0u);
+  propeller.run_for(200ms);
+  propeller.stop();
+  propeller.run_for(1s);
+  EXPECT_EQ(propeller.module.count([](const auto& m) { return m.is_speed(); }), 0u);
 }
 
 struct Seen {

@@ -60,22 +60,11 @@ Access access_of(const std::string& op) {
 }
 
 Format format_of(const std::string& text) {
-  switch (text.at(0)) {
-    case 'f':
-      return Format::f32;
-    case 'b':
-      return Format::i8;
-    case 'B':
-      return Format::u8;
-    case 'H':
-      return Format::u16;
-    case 'I':
-      return Format::u32;
-    case 'i':
-      return Format::i32;
-    default:
-      return Format::none;
-  }
+  constexpr std::pair<char, Format> kLetters[] = {{'f', Format::f32}, {'b', Format::i8},  {'B', Format::u8},
+                                                  {'H', Format::u16}, {'I', Format::u32}, {'i', Format::i32}};
+  for (const auto& [letter, format] : kLetters)
+    if (text.at(0) == letter) return format;
+  return Format::none;
 }
 
 Bytes encoded(const Packet& packet) {

@@ -226,14 +226,6 @@ TEST(Parser, TellsWhereAPacketEnds) {
   EXPECT_EQ(ends, (std::vector<std::uint64_t>{14, 25}));
 }
 
-TEST(Parser, TakesBurstsOfTwentyRepliesInOneRead) {
-  Bytes stream;
-  for (int i = 0; i < 20; ++i) append(stream, speed_reply(i));
-  Reception reception;
-  reception.push(stream);
-  EXPECT_EQ(reception.frames.size(), 20u);
-}
-
 TEST(Parser, LosesNothingBetweenNoise) {
   std::mt19937 random(3);
   Bytes stream;
@@ -264,7 +256,7 @@ TEST(Parser, DeliversTheGoodPacketBehindABadCrc) {
   EXPECT_EQ(reception.parser.counters().crc_errors, 1u);
 }
 
-TEST(Parser, DeliversBehindStrayStartsGarbageAndTruncation) {
+TEST(Parser, DeliversBehindStrayStartsGarbageTruncationAndRefusedLengths) {
   const Bytes good = speed_reply(2);
   const std::vector<Bytes> before = {
       {},           {0x55},      {0x55, 0x55, 0x55}, {0x00, 0xFF, 0x12}, Bytes(good.begin(), good.begin() + 6),
@@ -276,16 +268,9 @@ TEST(Parser, DeliversBehindStrayStartsGarbageAndTruncation) {
     Reception reception;
     reception.push(stream);
     EXPECT_EQ(reception.frames.size(), 2u) << fake::hex(noise);
+    if (noise != Bytes{0x55, 0xFF}) continue;
+    EXPECT_EQ(reception.parser.counters().refused_lengths, 1u) << fake::hex(noise);
   }
-}
-
-TEST(Parser, RefusesALengthOverTheLimitAtOnce) {
-  Bytes stream{0x55, 0xFF};
-  append(stream, speed_reply(2));
-  Reception reception;
-  reception.push(stream);
-  EXPECT_EQ(reception.frames.size(), 1u);
-  EXPECT_EQ(reception.parser.counters().refused_lengths, 1u);
 }
 
 TEST(Parser, AbandoningAFalseHeaderBringsOutWhatItWithheld) {
@@ -293,16 +278,13 @@ TEST(Parser, AbandoningAFalseHeaderBringsOutWhatItWithheld) {
     Bytes stream{0x55, length, 0x32};
     append(stream, speed_reply(2));
     Reception reception;
+    reception.push(stream);
     if (length != 0x0A) {
-      reception.push(stream);
       ASSERT_EQ(reception.frames.size(), 0u);
       ASSERT_TRUE(reception.parser.partial());
       EXPECT_EQ(reception.parser.partial_offset(), 0u);
-      reception.abandon();
-    } else {
-      reception.push(stream);
-      reception.abandon();
     }
+    reception.abandon();
     ASSERT_EQ(reception.frames.size(), 1u) << int{length};
     EXPECT_FALSE(reception.parser.partial());
   }
@@ -320,14 +302,6 @@ TEST(Parser, AbandoningKeepsAYoungerFrameThatIsStillComing) {
   reception.push(std::span(coming).subspan(5));
   ASSERT_EQ(reception.frames.size(), 2u);
   EXPECT_EQ(reception.frames[1], coming);
-}
-
-TEST(Parser, CarriesANanWithItsBits) {
-  const Bytes nan = fake::message(50, 13, 3, 0, {0x01, 0x00, 0xC0, 0x7F});
-  Reception reception;
-  reception.push(nan);
-  ASSERT_EQ(reception.frames.size(), 1u);
-  EXPECT_EQ(reception.frames[0], nan);
 }
 
 }  // namespace packet_test

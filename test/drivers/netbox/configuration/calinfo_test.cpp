@@ -1,13 +1,11 @@
 #include "drivers/netbox/configuration/calinfo.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include "base/error.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
+#include "test/refusal.hpp"
 
-namespace kphi::netbox {
-namespace calinfo_test {
+namespace kphi::netbox::calinfo_test {
 
 using namespace std::chrono_literals;
 using testing::HasSubstr;
@@ -54,12 +52,7 @@ class FakeTcp {
 };
 
 std::string failure_of(std::uint16_t port, std::chrono::nanoseconds timeout = 2s) {
-  try {
-    static_cast<void>(read_calinfo("127.0.0.1", port, timeout));
-  } catch (const DeviceError& error) {
-    return error.what();
-  }
-  return "none";
+  return refusal([&] { return read_calinfo("127.0.0.1", port, timeout); });
 }
 
 TEST(Calinfo, TheRequestIsTwentyBytes) {
@@ -68,14 +61,7 @@ TEST(Calinfo, TheRequestIsTwentyBytes) {
   EXPECT_EQ(encode_read_calinfo(), expected);
 }
 
-TEST(Calinfo, DecodesTheManualsExample) {
-  const auto calinfo = decode_calinfo(kExample);
-  ASSERT_TRUE(calinfo);
-  EXPECT_EQ(calinfo->force_unit, 2);
-  EXPECT_EQ(calinfo->torque_unit, 3);
-  EXPECT_EQ(calinfo->counts_per_force, 1'000'000u);
-  EXPECT_EQ(calinfo->counts_per_torque, 1'000'000u);
-}
+TEST(Calinfo, DecodesTheManualsExample) { EXPECT_EQ(decode_calinfo(kExample), (Calinfo{2, 3, 1'000'000, 1'000'000})); }
 
 TEST(Calinfo, RefusesWrongSizesAndHeaders) {
   for (std::size_t size = 0; size < kExample.size(); ++size)
@@ -135,5 +121,4 @@ TEST(CalinfoCrossCheck, AsksAndComparesAndNotesABoxWithoutTheInterface) {
   EXPECT_EQ(finding->severity, Severity::note);
 }
 
-}  // namespace calinfo_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::calinfo_test

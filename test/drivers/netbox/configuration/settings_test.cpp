@@ -1,7 +1,6 @@
 #include "drivers/netbox/configuration/settings.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -15,9 +14,10 @@
 #include "drivers/netbox/configuration/http.hpp"
 #include "test/drivers/netbox/box_process.hpp"
 #include "test/drivers/netbox/settable_web.hpp"
+#include "test/refusal.hpp"
+#include "test/temporary_folder.hpp"
 
-namespace kphi::netbox {
-namespace settings_test {
+namespace kphi::netbox::settings_test {
 
 using test::SettableWeb;
 using testing::AllOf;
@@ -68,22 +68,10 @@ class Mortal {
 
 class SettingsTest : public testing::Test {
  protected:
-  SettingsTest()
-      : journal(std::filesystem::temp_directory_path() /
-                ("kphi_settings_" + std::to_string(getpid()) + "_" +
-                 testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    std::filesystem::remove(journal);
-  }
-  ~SettingsTest() override { std::filesystem::remove(journal); }
-
   std::string failure(const WantedSettings& wanted) {
-    try {
-      const SettingsKeeper keeper(web.address(), wanted, journal);
-    } catch (const DeviceError& error) {
-      return error.what();
-    }
-    return "none";
+    return refusal([&] { return SettingsKeeper(web.address(), wanted, journal).notes(); });
   }
+  [[nodiscard]] bool journal_exists() const { return std::filesystem::exists(journal); }
   /// Rate, records per datagram, filter, slot.
   std::string values() const {
     return web.value("comrdtrate") + " " + web.value("comrdtbsiz") + " " + web.value("setuserfilter") + " " +
@@ -93,20 +81,17 @@ class SettingsTest : public testing::Test {
 
   Mortal mortal;  // before all that has threads
   SettableWeb web;
-  const std::filesystem::path journal;
+  const kphi::test::TemporaryFolder folder;
+  const std::filesystem::path journal = folder / "journal";
 };
 
-TEST_F(SettingsTest, WritesNothingWhenNothingIsWanted) {
-  const SettingsKeeper keeper(web.address(), {}, journal);
-  EXPECT_THAT(web.writes(), IsEmpty());
-  EXPECT_FALSE(std::filesystem::exists(journal));
-}
-
-TEST_F(SettingsTest, WritesNothingWhenTheBoxIsSoAlready) {
-  const SettingsKeeper keeper(web.address(),
-                              {.rate_hz = 7000, .records_per_datagram = 40, .filter = 0, .configuration = 0}, journal);
-  EXPECT_THAT(web.writes(), IsEmpty());
-  EXPECT_FALSE(std::filesystem::exists(journal));
+TEST_F(SettingsTest, WritesNothingWhenNothingIsWantedOrTheBoxIsSoAlready) {
+  const WantedSettings as_it_is{.rate_hz = 7000, .records_per_datagram = 40, .filter = 0, .configuration = 0};
+  for (const WantedSettings& wanted : {WantedSettings{}, as_it_is}) {
+    const SettingsKeeper keeper(web.address(), wanted, journal);
+    EXPECT_THAT(web.writes(), IsEmpty());
+    EXPECT_FALSE(journal_exists());
+  }
 }
 
 TEST_F(SettingsTest, WritesOneUrlPerPageAndReadsBackWhatTheBoxRuns) {
@@ -117,11 +102,11 @@ TEST_F(SettingsTest, WritesOneUrlPerPageAndReadsBackWhatTheBoxRuns) {
                 ElementsAre("/setting.cgi?setcfgsel=3&setuserfilter=4", "/comm.cgi?comrdtrate=1000&comrdtbsiz=10"));
     EXPECT_EQ(values(), "1000 10 4 3");
     EXPECT_THAT(keeper.notes(), IsEmpty());
-    EXPECT_TRUE(std::filesystem::exists(journal));
+    EXPECT_TRUE(journal_exists());
   }
   EXPECT_EQ(values(), "7000 40 0 0");
   EXPECT_THAT(web.writes(), SizeIs(4));
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
 }
 
 TEST_F(SettingsTest, ARateIsQuantisedLikeTheBoxAndToldSo) {
@@ -159,17 +144,17 @@ TEST_F(SettingsTest, ABoxThatNeverTakesAValueIsAnErrorAndLeavesNoJournal) {
   web.behave({.writes_ignored = 1000});
   EXPECT_THAT(failure({.rate_hz = 1000}), AllOf(HasSubstr("keeps rate_hz at 7000"), HasSubstr("not take 1000")));
   EXPECT_THAT(web.writes(), SizeIs(4));
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
 }
 
 TEST_F(SettingsTest, AnyOtherAnswerThan302IsAnErrorAndWhatWasDoneIsSetBack) {
   web.behave({.write_status = "200 OK"});
   EXPECT_THAT(failure({.rate_hz = 1000}), HasSubstr("HTTP status 200"));
   EXPECT_EQ(web.value("comrdtrate"), "7000");
-  EXPECT_TRUE(std::filesystem::exists(journal)) << "this box's word is worth nothing: its settings are to be looked at";
+  EXPECT_TRUE(journal_exists()) << "this box's word is worth nothing: its settings are to be looked at";
   web.behave({});
   EXPECT_THAT(SettingsKeeper::recover(web.address(), journal), IsEmpty());
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
 }
 
 TEST_F(SettingsTest, RefusesWhatIsOutOfRangeWithoutARequest) {
@@ -183,7 +168,7 @@ TEST_F(SettingsTest, RefusesWhatIsOutOfRangeWithoutARequest) {
 TEST_F(SettingsTest, RefusesASlotThatMeasuresNothingBeforeWriting) {
   EXPECT_THAT(failure({.rate_hz = 1000, .configuration = 5}), AllOf(HasSubstr("slot 5"), HasSubstr("FT0000")));
   EXPECT_THAT(web.writes(), IsEmpty());
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
 }
 
 TEST_F(SettingsTest, TheJournalHoldsAllSixteenSlotsVerbatim) {
@@ -211,11 +196,11 @@ TEST_F(SettingsTest, ARestoreThatFailsIsAnErrorAndKeepsTheJournal) {
   web.behave({.writes_ignored = 1000});
   EXPECT_THAT([&] { keeper.restore(); },
               testing::ThrowsMessage<DeviceError>(HasSubstr("set comrdtrate to 7000 on the box's web pages")));
-  EXPECT_TRUE(std::filesystem::exists(journal));
+  EXPECT_TRUE(journal_exists());
   web.behave({});
   keeper.restore();
   EXPECT_EQ(web.value("comrdtrate"), "7000");
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
 }
 
 TEST_F(SettingsTest, LeavesAloneWhatSomebodyElseHasChangedSince) {
@@ -231,11 +216,11 @@ TEST_F(SettingsTest, LeavesAloneWhatSomebodyElseHasChangedSince) {
 TEST_F(SettingsTest, AKilledProgramIsRecoveredFromAtTheNextStart) {
   die_holding({.rate_hz = 500, .filter = 3});
   EXPECT_EQ(web.value("comrdtrate"), "500");
-  ASSERT_TRUE(std::filesystem::exists(journal));
+  ASSERT_TRUE(journal_exists());
   EXPECT_THAT(SettingsKeeper::recover(web.address(), journal), SizeIs(2));
   EXPECT_EQ(web.value("comrdtrate"), "7000");
   EXPECT_EQ(web.value("setuserfilter"), "0");
-  EXPECT_FALSE(std::filesystem::exists(journal));
+  EXPECT_FALSE(journal_exists());
   EXPECT_THAT(SettingsKeeper::recover(web.address(), journal), IsEmpty());
 }
 
@@ -254,13 +239,13 @@ TEST_F(SettingsTest, AJournalOfAnotherBoxIsRefusedAndKept) {
   die_holding({.rate_hz = 500});
   web.behave({.serial = "LOT0002"});
   EXPECT_THAT(failure({}), AllOf(HasSubstr("LOT0001"), HasSubstr("LOT0002")));
-  EXPECT_TRUE(std::filesystem::exists(journal));
+  EXPECT_TRUE(journal_exists());
 }
 
 TEST_F(SettingsTest, AFileThatIsNoJournalIsRefusedAndKept) {
   std::ofstream(journal) << "rate: 7000\n";
   EXPECT_THAT(failure({}), HasSubstr("not a journal"));
-  EXPECT_TRUE(std::filesystem::exists(journal));
+  EXPECT_TRUE(journal_exists());
   EXPECT_THAT(web.writes(), IsEmpty());
 }
 
@@ -283,5 +268,4 @@ TEST_F(SettingsTest, RateAndFilterOfAnAxiaAreRefused) {
   EXPECT_THAT(web.writes(), IsEmpty());
 }
 
-}  // namespace settings_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::settings_test

@@ -1,12 +1,10 @@
 #include "drivers/netbox/receive/audit.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "test/drivers/netbox/record_bytes.hpp"
 
-namespace kphi::netbox {
-namespace audit_test {
+namespace kphi::netbox::audit_test {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -35,10 +33,15 @@ std::vector<double> paper_speeds() {
   return speeds;
 }
 
-TEST(Audit, FindsNothingInAGoodBox) {
+Intention of_the_paper() {
   Intention intention;
   intention.speeds_rpm = paper_speeds();
   intention.blades = 3;
+  return intention;
+}
+
+TEST(Audit, FindsNothingInAGoodBox) {
+  Intention intention = of_the_paper();
   intention.largest_thrust_n = 10;
   intention.rate_hz = 7000;
   intention.records_per_datagram = 40;
@@ -86,8 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"AliasedRotor",
              [](Configuration& box, Intention& intention) {
                set_divisor(box, 28);
-               intention.speeds_rpm = paper_speeds();
-               intention.blades = 3;
+               intention = of_the_paper();
              },
              Severity::fault, "4971.8 RPM (3-blade pass at 248.59 Hz appears at 1.41 Hz)", "7000 Hz"},
         Case{"CoarseCounts",
@@ -141,10 +143,7 @@ TEST(Audit, AFilterBelowTheRotorsLineKeepsItOut) {
   Configuration box = good_box();
   set_divisor(box, 28);
   box.filter_code = 4;  // 73 Hz
-  Intention intention;
-  intention.speeds_rpm = paper_speeds();
-  intention.blades = 3;
-  EXPECT_THAT(audit(box, intention), IsEmpty());
+  EXPECT_THAT(audit(box, of_the_paper()), IsEmpty());
 }
 
 TEST(AliasedLines, AreThoseOfThePaperAtAHundredHertz) {
@@ -174,5 +173,4 @@ TEST(AliasedLines, ASlowRotorIsNotAliased) {
   EXPECT_THAT(aliased_lines(1000, slow, 2, 2), IsEmpty());
 }
 
-}  // namespace audit_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::audit_test

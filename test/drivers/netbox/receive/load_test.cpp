@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace kphi::netbox {
-namespace load_test {
+namespace kphi::netbox::load_test {
 
 TEST(ZeroEstimate, IsMeanAndSpreadInNewtonsAndNewtonMetresWithoutSaturatedAndFaultyRecords) {
   Configuration scale;
@@ -68,5 +67,4 @@ TEST(RangeWatchOfPounds, UsesTheRangeInSi) {
   EXPECT_EQ(RangeWatch(configuration).look({9, 0, 0, 0, 0, 0}), RangeVerdict::near);  // 40 N
 }
 
-}  // namespace load_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::load_test

@@ -1,18 +1,13 @@
 #include "drivers/netbox/receive/probe.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include "test/drivers/netbox/fake_box.hpp"
+#include "test/drivers/netbox/load_cell_bench.hpp"
 
-namespace kphi::netbox {
-namespace probe_test {
+namespace kphi::netbox::probe_test {
 
 using namespace std::chrono_literals;
-using test::captured_xml;
-using test::FakeBox;
-using test::FakeWeb;
-using test::with;
+using namespace test;
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -24,13 +19,9 @@ ProbeSettings quick() {
   return settings;
 }
 
-std::string xml() { return with(with(captured_xml(), "comrdtrate", "7000"), "comrdtbsiz", "40"); }
-
 TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({});
-  const SteadyClock clock;
-  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  BenchBox bench;
+  const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_TRUE(found.answers());
   EXPECT_GT(found.counters.received, 1000u);
   EXPECT_EQ(found.counters.lost_network + found.counters.lost_host, 0u);
@@ -41,32 +32,28 @@ TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
   EXPECT_THAT(lines, Contains(HasSubstr("RDT enabled, 7000 Hz, 40 records per datagram, no filter")));
   EXPECT_THAT(lines, Contains(HasSubstr("0 lost, 0 late, 0 duplicates")));
   EXPECT_THAT(lines, Contains(HasSubstr("note: could not cross-check the scale")));
-  EXPECT_EQ(box.settings_written() + box.biases(), 0) << "a probe changes nothing";
+  EXPECT_EQ(bench.box.settings_written() + bench.box.biases(), 0) << "a probe changes nothing";
 }
 
 TEST(Probe, SaysThatRdtIsDisabledInsteadOfWaiting) {
-  FakeWeb web(FakeWeb::page(with(xml(), "comrdte", "Disabled")));
-  FakeBox box({});
-  const SteadyClock clock;
-  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  BenchBox bench({}, FakeWeb::page(with(streaming_xml(), "comrdte", "Disabled")));
+  const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_FALSE(found.answers());
   ASSERT_FALSE(found.findings.empty());
   EXPECT_EQ(found.findings[0].severity, Severity::fault);
   EXPECT_THAT(found.findings[0].what, HasSubstr("RDT is disabled"));
-  EXPECT_EQ(box.starts(), 0);
+  EXPECT_EQ(bench.box.starts(), 0);
 }
 
 TEST(Probe, CountsWhatTheNetworkLoses) {
-  FakeWeb web(FakeWeb::page(xml()));
-  FakeBox box({.skip_every = 10});
-  const SteadyClock clock;
-  const Probe found = probe({"127.0.0.1", box.port(), web.port()}, clock, quick());
+  BenchBox bench({.skip_every = 10});
+  const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_TRUE(found.answers());
   EXPECT_THAT(found.lines(), Contains(testing::AllOf(HasSubstr("warning"), HasSubstr("lost in the network"))));
 }
 
 TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
-  const std::uint16_t closed = test::closed_port(SOCK_STREAM);
+  const std::uint16_t closed = closed_port(SOCK_STREAM);
   const SteadyClock clock;
   const Probe found = probe({"127.0.0.1", 1, closed}, clock, quick());
   EXPECT_FALSE(found.answers());
@@ -74,5 +61,4 @@ TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
   EXPECT_THAT(found.findings[0].what, HasSubstr("check the address"));
 }
 
-}  // namespace probe_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::probe_test

@@ -6,8 +6,7 @@
 #include "base/error.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
 
-namespace kphi::netbox {
-namespace udp_socket_test {
+namespace kphi::netbox::udp_socket_test {
 
 using namespace std::chrono_literals;
 using test::LoopbackSocket;
@@ -34,20 +33,17 @@ class UdpSocketTest : public testing::Test {
 TEST_F(UdpSocketTest, ReceivesNothingWhereNothingWaits) { EXPECT_TRUE(socket.receive().empty()); }
 
 TEST_F(UdpSocketTest, TakesAllThatWaitsWithItsSizesAndStamps) {
-  timespec before{}, after{};
+  timespec before{};
   clock_gettime(CLOCK_REALTIME, &before);
   for (const std::size_t size : {36u, 0u, 1440u, 1476u}) send_from(box, size);
-  clock_gettime(CLOCK_REALTIME, &after);
   const auto datagrams = socket.receive();
-  ASSERT_EQ(datagrams.size(), 4u);
-  EXPECT_EQ(datagrams[0].bytes.size(), 36u);
-  EXPECT_EQ(datagrams[1].bytes.size(), 0u);
-  EXPECT_EQ(datagrams[2].bytes.size(), 1440u);
-  EXPECT_EQ(datagrams[3].bytes.size(), 1476u);
+  std::vector<std::size_t> sizes;
   for (const UdpSocket::Datagram& datagram : datagrams) {
+    sizes.push_back(datagram.bytes.size());
     EXPECT_GE(datagram.stamp.tv_sec, before.tv_sec);
     EXPECT_EQ(datagram.dropped, 0u);
   }
+  EXPECT_EQ(sizes, (std::vector<std::size_t>{36, 0, 1440, 1476}));
 }
 
 TEST_F(UdpSocketTest, WhatIsTooLongIsCutToASizeThatNoRecordHas) {
@@ -146,5 +142,4 @@ TEST(ReceiveBuffer, IsAWarningBelowHalfASecondAndElseANote) {
   EXPECT_NE(forty->what.find("more than 526 ms"), std::string::npos);
 }
 
-}  // namespace udp_socket_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::udp_socket_test

@@ -3,15 +3,11 @@
 #include "drivers/netbox/stream/health.hpp"
 #include "test/drivers/netbox/delay_channel.hpp"
 
-namespace kphi::netbox {
-namespace clock_estimate_test {
+namespace kphi::netbox::clock_estimate_test {
 
 using namespace std::chrono_literals;
 
-using test::Channel;
-using test::kRate;
-using test::Quality;
-using test::quality_of;
+using namespace test;
 
 TEST(ClockEstimate, StaysWithinFiveMicrosecondsOnALoadedHost) {
   for (unsigned seed = 0; seed < 5; ++seed) {
@@ -80,5 +76,4 @@ TEST(ClockEstimate, DoubtsARateThatIsAnotherThanConfigured) {
   EXPECT_GT(estimate.skew_ppm(), ClockEstimate::kBelievableSkewPpm);
 }
 
-}  // namespace clock_estimate_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::clock_estimate_test

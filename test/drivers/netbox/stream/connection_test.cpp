@@ -2,19 +2,15 @@
 #include "drivers/netbox/stream/connection.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "test/drivers/netbox/record_bytes.hpp"
 
-namespace kphi::netbox {
-namespace connection_test {
+namespace kphi::netbox::connection_test {
 
 using namespace std::chrono_literals;
-using test::captured_xml;
-using test::records;
-using test::with;
+using namespace test;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
@@ -85,6 +81,15 @@ class ConnectionTest : public testing::Test {
     connection.answered(std::move(given), now += 1ms);
     connection.advance(now);
   }
+  void answer_the_next_question(Answer given) {
+    advance_to_deadline();
+    ASSERT_TRUE(connection.next_question());
+    answer(std::move(given));
+  }
+  void stream_and_fall_silent() {
+    stream();
+    fall_silent();
+  }
 
   Instant now = 1s;
   Connection connection{parse_configuration(page())};
@@ -101,20 +106,13 @@ TEST(Answer, SaysHowFarItCame) {
 }
 
 TEST_F(ConnectionTest, ABoxThatWasAwayStreamsAgainWhenItAnswers) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   answer(no_answer());
   EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::unreachable));
   EXPECT_THAT(requested(), IsEmpty());
-  for (int i = 0; i < 3; ++i) {
-    advance_to_deadline();
-    ASSERT_TRUE(connection.next_question());
-    answer(no_answer());
-  }
+  for (int i = 0; i < 3; ++i) answer_the_next_question(no_answer());
   EXPECT_THAT(events(), IsEmpty()) << "the same answer is reported once";
-  advance_to_deadline();
-  ASSERT_TRUE(connection.next_question());
-  answer(answer_of(page()));
+  answer_the_next_question(answer_of(page()));
   EXPECT_THAT(requested(), ElementsAre(0));
   EXPECT_EQ(connection.state(), State::silent) << "until a record arrives";
   advance_to_deadline();
@@ -131,20 +129,16 @@ TEST_F(ConnectionTest, ABoxThatWasAwayInAnyWayIsStartedWhenItIsBack) {
   for (const Answer& away : {no_answer(), answer_of("<html/>"), answer_of(page("comrdte", "Disabled"))}) {
     connection.stop(now);
     (void)requested();
-    stream();
-    fall_silent();
+    stream_and_fall_silent();
     answer(away);
     EXPECT_THAT(requested(), IsEmpty());
-    advance_to_deadline();
-    ASSERT_TRUE(connection.next_question());
-    answer(answer_of(page()));
+    answer_the_next_question(answer_of(page()));
     EXPECT_THAT(requested(), ElementsAre(0));
   }
 }
 
 TEST_F(ConnectionTest, ABoxThatHasBootedStreamsAgainAtOnceAndAfterTheNextSilenceItIsLeftAlone) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   answer(answer_of(kForgottenPeaks));
   EXPECT_THAT(requested(), ElementsAre(0));
   EXPECT_THAT(events(), ElementsAre(EventKind::silent));
@@ -159,8 +153,7 @@ TEST_F(ConnectionTest, ABoxThatHasBootedStreamsAgainAtOnceAndAfterTheNextSilence
 }
 
 TEST_F(ConnectionTest, AnAnswerThatComesAfterTheStreamIsNoNews) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   receive(41);
   answer(no_answer());
   EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::resumed));
@@ -182,8 +175,7 @@ TEST_F(ConnectionTest, ABoxThatComesBackByItselfIsAskedAgainOnlyAfterItsNextSile
 }
 
 TEST_F(ConnectionTest, AStreamThatAnotherClientHasTakenIsLeftAlone) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   answer(answer_of(page()));
   EXPECT_THAT(events(), ElementsAre(EventKind::silent, EventKind::taken_over));
   EXPECT_EQ(connection.deadline(), kNever);
@@ -193,8 +185,7 @@ TEST_F(ConnectionTest, AStreamThatAnotherClientHasTakenIsLeftAlone) {
 }
 
 TEST_F(ConnectionTest, AsksLessAndLessOftenUntilItGivesUpABoxThatStaysAway) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   const Instant silent = now;
   connection.answered(no_answer(), now);
   EXPECT_THAT(pauses_until(silent + 59s, no_answer()),
@@ -206,8 +197,7 @@ TEST_F(ConnectionTest, AsksLessAndLessOftenUntilItGivesUpABoxThatStaysAway) {
 }
 
 TEST_F(ConnectionTest, AStartWithoutARecordIsFollowedByAQuestion) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   answer(answer_of(kForgottenPeaks));
   while (connection.state() == State::silent && !connection.next_question()) advance_to_deadline();
   EXPECT_EQ(requested().front(), 0);
@@ -233,12 +223,9 @@ TEST_F(ConnectionTest, AfterABootWithTheStreamGoingOnItAsksAndNamesTheChange) {
 }
 
 TEST_F(ConnectionTest, AnotherRateIsStreamedByItsOwnStride) {
-  stream();
-  fall_silent();
+  stream_and_fall_silent();
   answer(no_answer());
-  advance_to_deadline();
-  ASSERT_TRUE(connection.next_question());
-  answer(answer_of(page("comrdtrate", "1000")));
+  answer_the_next_question(answer_of(page("comrdtrate", "1000")));
   EXPECT_EQ(connection.settings().divisor, 7u);
   advance_to_deadline();
   EXPECT_THAT(requested(), ElementsAre(0, 3));
@@ -304,5 +291,4 @@ TEST(Gathering, EndsByTheStreamsTimeHoweverLateTheThreadIs) {
   EXPECT_EQ(connection.gathering_time(-1h), whole) << "a clock that was set back";
 }
 
-}  // namespace connection_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::connection_test

@@ -1,6 +1,8 @@
 // Records as a line of text, and counters as words.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <sstream>
 #include <string>
@@ -48,6 +50,9 @@ inline std::vector<Step> steps_of(const std::string& feed, unsigned stride = 1) 
   }
   return steps;
 }
+
+/// The account adds up.
+inline void expect_closed(const Counters& c) { EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host); }
 
 /// "lost 1, late 2": what is not zero.
 inline std::string words_of(const Counters& counters) {

@@ -6,8 +6,7 @@
 
 #include "base/published.hpp"
 
-namespace kphi::netbox {
-namespace health_test {
+namespace kphi::netbox::health_test {
 
 using namespace std::chrono_literals;
 
@@ -65,5 +64,4 @@ TEST(Published, IsReadWholeWhileItIsWritten) {
   writer.join();
 }
 
-}  // namespace health_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::health_test

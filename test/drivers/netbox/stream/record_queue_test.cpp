@@ -7,8 +7,7 @@
 #include <random>
 #include <thread>
 
-namespace kphi::netbox {
-namespace record_queue_test {
+namespace kphi::netbox::record_queue_test {
 
 /// Writes up to `count` records in place or by copying, numbered from `next` on; returns how many.
 std::size_t write(RecordQueue& queue, std::size_t count, std::uint32_t next, bool in_place) {
@@ -76,5 +75,4 @@ TEST(RecordQueue, LosesNothingBetweenTwoThreads) {
   EXPECT_TRUE(queue.empty());
 }
 
-}  // namespace record_queue_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::record_queue_test

@@ -7,13 +7,10 @@
 #include "drivers/netbox/stream/reorder_window.hpp"
 #include "test/drivers/netbox/stream/feed.hpp"
 
-namespace kphi::netbox {
-namespace reorder_test {
+namespace kphi::netbox::reorder_test {
 
 using namespace std::chrono_literals;
-using test::Step;
-using test::steps_of;
-using test::words_of;
+using namespace test;
 
 /// A window of 64 records and 20 ms.
 class Reordered {
@@ -40,7 +37,7 @@ class Reordered {
     EXPECT_EQ(delivered(), numbers);
     const Counters& c = account.counters();
     EXPECT_EQ(words_of(c), counts);
-    EXPECT_EQ(c.expected, c.received + c.lost_network + c.lost_host);
+    expect_closed(c);
     EXPECT_EQ(c.received, out.size());
     EXPECT_EQ(window.deadline() == kNever, window.empty());
   }
@@ -171,16 +168,16 @@ TEST(ReorderProperty, EveryRecordThatCameInTimeIsDeliveredOnceAndInOrder) {
     }
     window.flush(account, out);
     const Counters& c = account.counters();
-    EXPECT_EQ(c.lost_network, lost) << seed;
-    EXPECT_EQ(c.received, 1000 - lost) << seed;
-    EXPECT_EQ(c.received, out.size()) << seed;
-    EXPECT_EQ(c.expected, 1000u) << seed;
-    EXPECT_EQ(c.duplicates, doubled) << seed;
-    EXPECT_EQ(c.late + c.restarts + c.reboots + c.irregular, 0u) << seed;
+    SCOPED_TRACE(seed);
+    EXPECT_EQ(c.lost_network, lost);
+    EXPECT_EQ(c.received, 1000 - lost);
+    EXPECT_EQ(c.received, out.size());
+    EXPECT_EQ(c.expected, 1000u);
+    EXPECT_EQ(c.duplicates, doubled);
+    EXPECT_EQ(c.late + c.restarts + c.reboots + c.irregular, 0u);
     for (std::size_t i = 1; i < out.size(); ++i)
       ASSERT_GT(static_cast<std::int32_t>(out[i].ft_sequence - out[i - 1].ft_sequence), 0) << seed;
   }
 }
 
-}  // namespace reorder_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::reorder_test

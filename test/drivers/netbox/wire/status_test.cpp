@@ -1,10 +1,8 @@
 #include "drivers/netbox/wire/status.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-namespace kphi::netbox {
-namespace status_test {
+namespace kphi::netbox::status_test {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
@@ -34,12 +32,8 @@ TEST(Status, NamesWhatIsSetMostSignificantFirst) {
   EXPECT_THAT(names(0x80010000), ElementsAre("monitor condition latched"));
   EXPECT_THAT(names(0x80020000), ElementsAre("transducer saturation or A/D error"));
   EXPECT_THAT(names(0xC0000004), ElementsAre("CPU or RAM error", "internal temperature error"));
-}
-
-TEST(Status, AnErrorSummaryWithoutACauseIsNamedToo) { EXPECT_THAT(names(0x80000000), ElementsAre("error summary")); }
-
-TEST(Status, BitsWithoutAMeaningAreNamedByTheirNumber) {
-  EXPECT_THAT(names(0x00008001), ElementsAre("bit 15", "bit 0"));
+  EXPECT_THAT(names(0x80000000), ElementsAre("error summary")) << "without a cause";
+  EXPECT_THAT(names(0x00008001), ElementsAre("bit 15", "bit 0")) << "without a meaning";
 }
 
 TEST(Status, EveryBitOfTable17_1HasItsName) {
@@ -127,5 +121,4 @@ TEST(Status, EveryBitOfTheAxiasMapHasItsName) {
   EXPECT_THAT(names(1u << 31, Product::axia), ElementsAre("error summary"));
 }
 
-}  // namespace status_test
-}  // namespace kphi::netbox
+}  // namespace kphi::netbox::status_test

@@ -3,8 +3,7 @@
 
 #include "test/drivers/sim/iq_module.hpp"
 
-namespace kphi::sim {
-namespace actions_test {
+namespace kphi::sim::actions_test {
 
 using namespace std::chrono_literals;
 using test::hex;
@@ -169,5 +168,4 @@ TEST_F(Action, QuestionsWaitTheirTurn) {
   EXPECT_EQ(reply.asked, 12ms) << "the second is read when the first is answered";
 }
 
-}  // namespace actions_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::actions_test

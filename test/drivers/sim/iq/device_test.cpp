@@ -7,12 +7,10 @@
 
 #include "test/drivers/sim/iq_module.hpp"
 
-namespace kphi::sim {
-namespace device_test {
+namespace kphi::sim::device_test {
 
 using namespace std::chrono_literals;
-using test::bytes;
-using test::hex;
+using namespace test;
 using Mode = MotorDrive::Mode;
 
 using Module = test::ExactModule;
@@ -187,5 +185,4 @@ TEST(IqEntries, AnswerByTheirAccessAndLengthInBothFirmwares) {
   }
 }
 
-}  // namespace device_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::device_test

@@ -6,11 +6,9 @@
 
 #include "test/drivers/sim/hex.hpp"
 
-namespace kphi::sim {
-namespace frame_test {
+namespace kphi::sim::frame_test {
 
-using test::bytes;
-using test::hex;
+using namespace test;
 
 struct Vector {
   std::uint8_t type, sub, access;
@@ -97,5 +95,4 @@ TEST(IqFrame, WaitsForTheRestInAnyChunks) {
   EXPECT_EQ(count, 50 * static_cast<int>(std::size(kVectors)));
 }
 
-}  // namespace frame_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::frame_test

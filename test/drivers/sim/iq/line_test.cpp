@@ -5,14 +5,13 @@
 #include <optional>
 
 #include "drivers/sim/truth_log.hpp"
+#include "test/drivers/sim/fault_words.hpp"
 #include "test/drivers/sim/hex.hpp"
 
-namespace kphi::sim {
-namespace line_test {
+namespace kphi::sim::line_test {
 
 using namespace std::chrono_literals;
-using test::bytes;
-using test::hex;
+using namespace test;
 
 constexpr std::string_view kGetSpeed = "55 02 32 0D 00 31 B4";
 constexpr std::string_view kGetFault = "55 02 54 00 00 A6 EB";
@@ -26,11 +25,9 @@ class Line : public ::testing::Test {
     module.oscillator_gain = 0;
     module.sensors.perfect = true;
   }
-  void make(std::vector<FaultEntry> entries = {}) {
-    FaultScript script;
-    for (const FaultEntry& entry : entries) script.push_back(fault_of(entry));
+  void make(const std::vector<std::string>& faults = {}) {
     device.emplace(module, state);
-    line.emplace(*device, settings, script, 7, IqLine::Keep::replies);
+    line.emplace(*device, settings, test::fault_script(faults), 7, IqLine::Keep::replies);
   }
   /// What has come until `now`, as hex; `times` gets each chunk's.
   std::string hear(Instant now) {
@@ -50,9 +47,8 @@ class Line : public ::testing::Test {
     return hear(at + patience);
   }
   /// The answer to a question of the speed while this is wrong.
-  std::string with(const std::string& kind, std::map<std::string, std::string> more = {}) {
-    more.insert({{"at_s", "0"}, {"kind", kind}});
-    make({more});
+  std::string with(const std::string& fault) {
+    make({fault + " at_s=0"});
     return ask(kGetSpeed);
   }
 
@@ -63,12 +59,6 @@ class Line : public ::testing::Test {
   std::optional<IqLine> line;
   std::vector<Instant> times;
 };
-
-const std::map<std::string, std::string> kOnce{{"count", "1"}};
-std::map<std::string, std::string> once(std::map<std::string, std::string> more) {
-  more.insert(kOnce.begin(), kOnce.end());
-  return more;
-}
 
 TEST_F(Line, CarriesBothWaysAtOnce) {
   make();
@@ -165,39 +155,39 @@ TEST_F(Line, TheAnswerToANewRateIsAtTheNewRate) {
 }
 
 TEST_F(Line, SpoilsTheBytesOfAReply) {
-  EXPECT_NE(with("motor_flip", kOnce), kSpeed);
+  EXPECT_NE(with("motor_flip count=1"), kSpeed);
   EXPECT_EQ(line->truth().frames_arrived, 0u);
   EXPECT_EQ(line->truth().spoilt, 1u);
-  EXPECT_EQ(with("motor_bad_crc", kOnce).substr(0, 27), kSpeed.substr(0, 27));
+  EXPECT_EQ(with("motor_bad_crc count=1").substr(0, 27), kSpeed.substr(0, 27));
   EXPECT_EQ(line->truth().frames_arrived, 0u);
-  EXPECT_EQ(with("motor_truncate", once({{"size", "5"}})), kSpeed.substr(0, 15));
-  EXPECT_EQ(with("motor_garbage", once({{"bytes", "55 3B"}})), hex("55 3b") + kSpeed);
+  EXPECT_EQ(with("motor_truncate count=1 size=5"), kSpeed.substr(0, 15));
+  EXPECT_EQ(with("motor_garbage count=1 bytes=55 3B"), hex("55 3b") + kSpeed);
   EXPECT_EQ(line->truth().frames_arrived, 1u);
-  EXPECT_EQ(with("motor_garbage", once({{"size", "20"}})).size(), 60 + kSpeed.size());
+  EXPECT_EQ(with("motor_garbage count=1 size=20").size(), 60 + kSpeed.size());
 }
 
 TEST_F(Line, DropsDuplicatesAndReorders) {
-  EXPECT_EQ(with("motor_drop", kOnce), "");
+  EXPECT_EQ(with("motor_drop count=1"), "");
   EXPECT_EQ(line->truth().log[0].arrivals, 0u);
-  EXPECT_EQ(with("motor_duplicate", kOnce), kSpeed + kSpeed);
+  EXPECT_EQ(with("motor_duplicate count=1"), kSpeed + kSpeed);
   EXPECT_EQ(line->truth().log[0].arrivals, 2u);
-  EXPECT_EQ(with("motor_reorder", kOnce), kSpeed) << "alone it comes late";
+  EXPECT_EQ(with("motor_reorder count=1"), kSpeed) << "alone it comes late";
   EXPECT_EQ(times.back(), 1010ms);
-  make({{{"kind", "motor_reorder"}, {"at_s", "0"}, {"count", "1"}}});
+  make({"motor_reorder at_s=0 count=1"});
   EXPECT_EQ(ask(std::string(kGetSpeed) + std::string(kGetFault)), kFault + kSpeed);
 }
 
 TEST_F(Line, ChangesWhatIsSaid) {
-  EXPECT_EQ(with("motor_value", once({{"value", "nan"}})).substr(15, 12), "00 00 c0 7f ");
+  EXPECT_EQ(with("motor_value count=1 value=nan").substr(15, 12), "00 00 c0 7f ");
   EXPECT_EQ(hex(line->truth().log[0].data()), hex("00 00 c0 7f")) << "the truth says what was sent";
-  EXPECT_EQ(with("motor_value", once({{"value", "-inf"}})).substr(15, 12), "00 00 80 ff ");
-  EXPECT_EQ(with("motor_value", once({{"value", "denormal"}})).substr(15, 12), "01 00 00 00 ");
-  EXPECT_EQ(with("motor_wrong_length", once({{"size", "2"}})).substr(0, 15), hex("55 04 32 0D 03"));
-  EXPECT_EQ(with("motor_wrong_id", once({{"id", "5"}})), hex("55 06 32 0D 17 00 00 C8 42 2D 52"));
+  EXPECT_EQ(with("motor_value count=1 value=-inf").substr(15, 12), "00 00 80 ff ");
+  EXPECT_EQ(with("motor_value count=1 value=denormal").substr(15, 12), "01 00 00 00 ");
+  EXPECT_EQ(with("motor_wrong_length count=1 size=2").substr(0, 15), hex("55 04 32 0D 03"));
+  EXPECT_EQ(with("motor_wrong_id count=1 id=5"), hex("55 06 32 0D 17 00 00 C8 42 2D 52"));
 }
 
 TEST_F(Line, AStuckEntrySaysWhatItSaid) {
-  make({{{"kind", "motor_stuck"}, {"at_s", "0"}, {"for_s", "2.5"}, {"type", "50"}}});
+  make({"motor_stuck at_s=0 for_s=2.5 type=50"});
   EXPECT_EQ(ask(kGetSpeed), kSpeed);
   state.speed = 200;
   EXPECT_EQ(ask(kGetSpeed, 2s), kSpeed);
@@ -206,14 +196,14 @@ TEST_F(Line, AStuckEntrySaysWhatItSaid) {
 }
 
 TEST_F(Line, SpoilsTheTimes) {
-  EXPECT_EQ(with("motor_split", once({{"delay_s", "0.001"}})), kSpeed);
+  EXPECT_EQ(with("motor_split count=1 delay_s=0.001"), kSpeed);
   EXPECT_EQ(times.size(), 11u);
   EXPECT_EQ(times.back() - times.front(), 10ms);
-  EXPECT_EQ(with("motor_stall", once({{"size", "4"}, {"delay_s", "0.05"}})), kSpeed);
+  EXPECT_EQ(with("motor_stall count=1 size=4 delay_s=0.05"), kSpeed);
   EXPECT_EQ(times, (std::vector<Instant>{1s, 1050ms}));
-  EXPECT_EQ(with("motor_delay", once({{"delay_s", "0.2"}})), kSpeed);
+  EXPECT_EQ(with("motor_delay count=1 delay_s=0.2"), kSpeed);
   EXPECT_EQ(times, std::vector<Instant>{1200ms});
-  make({{{"kind", "motor_merge"}, {"at_s", "0"}, {"for_s", "5"}, {"delay_s", "0.03"}}});
+  make({"motor_merge at_s=0 for_s=5 delay_s=0.03"});
   line->send(bytes(kGetSpeed), 1s);
   line->advance(1005ms);
   line->send(bytes(kGetFault), 1005ms);
@@ -222,35 +212,35 @@ TEST_F(Line, SpoilsTheTimes) {
 }
 
 TEST_F(Line, OnlyTheEntryThatIsMeant) {
-  make({{{"kind", "motor_drop"}, {"at_s", "0"}, {"for_s", "9"}, {"type", "50"}, {"sub", "13"}}});
+  make({"motor_drop at_s=0 for_s=9 type=50 sub=13"});
   EXPECT_EQ(ask(std::string(kGetSpeed) + std::string(kGetFault)), kFault);
 }
 
 TEST_F(Line, ByProbabilityAndCount) {
-  make({{{"kind", "motor_drop"}, {"at_s", "0"}, {"for_s", "1000"}, {"p", "0.25"}}});
+  make({"motor_drop at_s=0 for_s=1000 p=0.25"});
   for (int i = 1; i <= 1000; ++i) ask(kGetSpeed, i * 1ms, 0s);
   EXPECT_NEAR(static_cast<double>(line->truth().frames_arrived), 750, 50);
-  make({{{"kind", "motor_drop"}, {"at_s", "0"}, {"count", "7"}}});
+  make({"motor_drop at_s=0 count=7"});
   for (int i = 1; i <= 100; ++i) ask(kGetSpeed, i * 1ms, 0s);
   EXPECT_EQ(line->truth().frames_arrived, 93u);
 }
 
 TEST_F(Line, BreaksInOneDirection) {
-  EXPECT_EQ(with("motor_mute", {{"for_s", "5"}}), "");
+  EXPECT_EQ(with("motor_mute for_s=5"), "");
   EXPECT_EQ(device->frames(), 1u) << "the module heard it";
-  EXPECT_EQ(with("motor_deaf", {{"for_s", "5"}}), "");
+  EXPECT_EQ(with("motor_deaf for_s=5"), "");
   EXPECT_EQ(device->frames(), 0u);
   EXPECT_EQ(ask(kGetSpeed, 6s), kSpeed) << "it is over";
 }
 
 TEST_F(Line, FlipsBitsOfCommands) {
-  make({{{"kind", "motor_command_flip"}, {"at_s", "0"}, {"count", "1"}}});
+  make({"motor_command_flip at_s=0 count=1"});
   EXPECT_EQ(ask(kGetSpeed), "");
   EXPECT_EQ(line->truth().done.at(FaultKind::motor_command_flip), 1u);
 }
 
 TEST_F(Line, UnpluggedNothingPassesAndAnotherModuleMayCome) {
-  make({{{"kind", "motor_unplug"}, {"at_s", "2"}, {"for_s", "1"}, {"other", "true"}}});
+  make({"motor_unplug at_s=2 for_s=1 other=true"});
   const std::string uid = ask("55 02 05 04 00 9C 4E");
   line->advance(2s);
   EXPECT_FALSE(line->plugged());
@@ -264,7 +254,7 @@ TEST_F(Line, UnpluggedNothingPassesAndAnotherModuleMayCome) {
 }
 
 TEST_F(Line, BrownOutForgetsAndIsSilentForAWhile) {
-  make({{{"kind", "motor_brown_out"}, {"at_s", "2"}, {"down_s", "0.5"}}});
+  make({"motor_brown_out at_s=2 down_s=0.5"});
   ask("55 06 34 0F 01 00 00 80 3E E9 8A");  // timeout 0.25 s
   EXPECT_EQ(ask(kGetSpeed, 2100ms, 100ms), "");
   EXPECT_EQ(ask("55 02 34 0F 00 F3 60", 3s).substr(15, 12), "00 00 00 3f ");
@@ -272,7 +262,7 @@ TEST_F(Line, BrownOutForgetsAndIsSilentForAWhile) {
 
 TEST_F(Line, FallsBackToItsFirstRate) {
   module.baud = 921600;
-  make({{{"kind", "motor_baud"}, {"at_s", "2"}}});
+  make({"motor_baud at_s=2"});
   line->host_rate(921600);
   EXPECT_EQ(ask(kGetSpeed), kSpeed);
   EXPECT_EQ(ask(kGetSpeed, 3s), "");
@@ -282,15 +272,15 @@ TEST_F(Line, FallsBackToItsFirstRate) {
 }
 
 TEST_F(Line, IgnoresSetsAndNotGets) {
-  make({{{"kind", "motor_ignore_sets"}, {"at_s", "0"}, {"for_s", "5"}}});
+  make({"motor_ignore_sets at_s=0 for_s=5"});
   ask("55 06 34 05 01 00 00 C8 42 95 37");
   EXPECT_EQ(device->drive().mode, MotorDrive::Mode::coast);
   EXPECT_EQ(ask(kGetSpeed, 2s), kSpeed);
 }
 
 TEST_F(Line, HeatsAndLowersTheRedline) {
-  make({{{"kind", "motor_hot"}, {"at_s", "0"}, {"for_s", "5"}, {"coil_celsius", "120"}, {"controller_celsius", "75"}},
-        {{"kind", "motor_redline"}, {"at_s", "0"}, {"for_s", "5"}, {"speed_rad_s", "99"}}});
+  make({"motor_hot at_s=0 for_s=5 coil_celsius=120 controller_celsius=75",
+        "motor_redline at_s=0 for_s=5 speed_rad_s=99"});
   ask("55 06 34 05 01 00 00 C8 42 95 37");
   for (int i = 0; i < 8; ++i) device->advance(1501ms);
   EXPECT_EQ(ask("55 02 53 00 00 36 6E", 2s).substr(15, 12), "00 00 11 43 ") << "145 degrees";
@@ -298,9 +288,8 @@ TEST_F(Line, HeatsAndLowersTheRedline) {
 }
 
 TEST_F(Line, DisturbsTheSupplyAndTheRotor) {
-  make({{{"kind", "motor_sag"}, {"at_s", "1"}, {"for_s", "1"}, {"volts", "3"}},
-        {{"kind", "motor_over_voltage"}, {"at_s", "3"}, {"for_s", "1"}, {"volts", "20"}},
-        {{"kind", "motor_locked"}, {"at_s", "5"}, {"for_s", "1"}}});
+  make({"motor_sag at_s=1 for_s=1 volts=3", "motor_over_voltage at_s=3 for_s=1 volts=20",
+        "motor_locked at_s=5 for_s=1"});
   for (const auto& [at, volts, locked] :
        {std::tuple{0.5, 0.0, false}, {1.5, -3.0, false}, {2.5, 0.0, false}, {3.5, 20.0, false}, {5.5, 0.0, true}}) {
     line->advance(from_seconds(at));
@@ -313,8 +302,7 @@ TEST_F(Line, DisturbsTheSupplyAndTheRotor) {
 TEST_F(Line, TheSameSeedGivesTheSameBytes) {
   std::string first;
   for (int round = 0; round < 2; ++round) {
-    make({{{"kind", "motor_flip"}, {"at_s", "0"}, {"for_s", "9"}, {"p", "0.5"}},
-          {{"kind", "motor_garbage"}, {"at_s", "0"}, {"for_s", "9"}, {"p", "0.5"}}});
+    make({"motor_flip at_s=0 for_s=9 p=0.5", "motor_garbage at_s=0 for_s=9 p=0.5"});
     std::string all;
     for (int i = 1; i < 100; ++i) all += ask(kGetSpeed, i * 10ms, 5ms);
     if (round == 0) first = all;
@@ -323,11 +311,10 @@ TEST_F(Line, TheSameSeedGivesTheSameBytes) {
 }
 
 TEST_F(Line, ItsTruthCanBeWritten) {
-  with("motor_flip", kOnce);
+  with("motor_flip count=1");
   const std::string text = json_lines(line->truth());
   EXPECT_NE(text.find(R"("faults":["motor_flip"])"), std::string::npos) << text;
   EXPECT_NE(text.find(R"("motor_totals")"), std::string::npos);
 }
 
-}  // namespace line_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::line_test

@@ -3,8 +3,7 @@
 
 #include "test/drivers/sim/iq_module.hpp"
 
-namespace kphi::sim {
-namespace quirks_test {
+namespace kphi::sim::quirks_test {
 
 using namespace std::chrono_literals;
 using test::hex;
@@ -112,5 +111,4 @@ TEST_F(Quirk, SafeModeReadsCoastAndEndsWithoutLatching) {
   EXPECT_EQ(device.stage().mode, PowerStage::Mode::drive);
 }
 
-}  // namespace quirks_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::quirks_test

@@ -6,8 +6,7 @@
 
 #include "drivers/sim/physics/motor.hpp"
 
-namespace kphi::sim {
-namespace sensors_test {
+namespace kphi::sim::sensors_test {
 
 class Sensors : public ::testing::Test {
  protected:
@@ -96,5 +95,4 @@ TEST_F(Sensors, JoulesAreWhatWasMeasured) {
   EXPECT_EQ(read().joules, 0);
 }
 
-}  // namespace sensors_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::sensors_test

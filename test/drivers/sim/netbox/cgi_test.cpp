@@ -2,13 +2,11 @@
 
 #include <string>
 
-#include "drivers/sim/netbox/device.hpp"
-#include "test/drivers/sim/hex.hpp"
+#include "test/drivers/sim/netbox/box.hpp"
 
-namespace kphi::sim {
-namespace cgi_test {
+namespace kphi::sim::cgi_test {
 
-using test::bytes;
+using test::box_that;
 
 std::string get(NetBoxDevice& box, const std::string& target) {
   return box.http("GET /" + target + " HTTP/1.0\r\nHost: box");
@@ -72,7 +70,7 @@ TEST_F(NetBoxWrites, AnEmptyCalibrationMeasuresNothing) {
 }
 
 TEST_F(NetBoxWrites, OfTheRateStopARunningStream) {
-  box.receive(bytes("12 34 00 02 00 00 00 00"), 1);
+  box.receive(test::kRealTime, 1);
   ASSERT_TRUE(box.streaming());
   write("comm.cgi?comrdtrate=7000");
   EXPECT_TRUE(box.streaming()) << "nothing changed";
@@ -81,25 +79,20 @@ TEST_F(NetBoxWrites, OfTheRateStopARunningStream) {
 }
 
 TEST_F(NetBoxWrites, OfTheRateMayAlsoGoOnAtTheNewStride) {
-  NetBoxSettings settings;
-  settings.quirks.rate_write = NetBoxQuirks::RateWrite::continues;
-  NetBoxDevice other(settings);
-  other.receive(bytes("12 34 00 02 00 00 00 00"), 1);
-  (void)get(other, "comm.cgi?comrdtrate=1000");
-  for (int i = 0; i < 70; ++i) other.sample({Instant(i), {}});
-  EXPECT_EQ(other.records_sent(), 10u);
+  box = box_that([](NetBoxSettings& s) { s.quirks.rate_write = NetBoxQuirks::RateWrite::continues; });
+  box.receive(test::kRealTime, 1);
+  write("comm.cgi?comrdtrate=1000");
+  test::after(box, 70);
+  EXPECT_EQ(box.records_sent(), 10u);
 }
 
 TEST_F(NetBoxWrites, BeyondThreeInASecondAreLostOnSomeBoxes) {
-  NetBoxSettings settings;
-  settings.quirks.only_three_writes = true;
-  NetBoxDevice strict(settings);
-  for (int rate : {1000, 500, 100, 70}) (void)get(strict, "comm.cgi?comrdtrate=" + std::to_string(rate));
-  EXPECT_EQ(element(strict, "comrdtrate"), "100");
-  for (int i = 0; i < 7000; ++i) strict.sample({Instant(i), {}});
-  (void)get(strict, "comm.cgi?comrdtrate=70");
-  EXPECT_EQ(element(strict, "comrdtrate"), "70");
+  box = box_that([](NetBoxSettings& s) { s.quirks.only_three_writes = true; });
+  for (const int rate : {1000, 500, 100, 70}) (void)get(box, "comm.cgi?comrdtrate=" + std::to_string(rate));
+  EXPECT_EQ(element(box, "comrdtrate"), "100");
+  test::after(box, 7000);
+  (void)get(box, "comm.cgi?comrdtrate=70");
+  EXPECT_EQ(element(box, "comrdtrate"), "70");
 }
 
-}  // namespace cgi_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::cgi_test

@@ -1,42 +1,14 @@
-#include "drivers/sim/netbox/device.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "test/drivers/sim/hex.hpp"
+#include "test/drivers/sim/netbox/box.hpp"
 
-namespace kphi::sim {
-namespace device_test {
+namespace kphi::sim::device_test {
 
-using test::bytes;
-using test::hex;
+using namespace test;
 
 constexpr Peer kClient = 7;
-
-/// Reads a big-endian number at a record's offset, independently of the box's writer.
-std::uint32_t word(const Datagram& datagram, std::size_t record, std::size_t offset) {
-  std::uint32_t value = 0;
-  for (std::size_t i = 0; i < 4; ++i) value = value * 256 + datagram.bytes[36 * record + offset + i];
-  return value;
-}
-std::uint32_t rdt(const Datagram& d, std::size_t record = 0) { return word(d, record, 0); }
-std::uint32_t ft(const Datagram& d, std::size_t record = 0) { return word(d, record, 4); }
-std::int32_t counts(const Datagram& d, std::size_t axis) {
-  return static_cast<std::int32_t>(word(d, 0, 12 + 4 * axis));
-}
-
-std::vector<Datagram> sent_by(NetBoxDevice& box) {
-  std::vector<Datagram> all;
-  Datagram next;
-  while (box.next_datagram(next)) all.push_back(next);
-  return all;
-}
-
-std::vector<Datagram> after(NetBoxDevice& box, int ticks, const Wrench& wrench = {}) {
-  for (int i = 0; i < ticks; ++i) box.sample({Instant(i), wrench});
-  return sent_by(box);
-}
 
 NetBoxDevice box_with(double rate_hz, int records, std::uint32_t first_ft = 0) {
   NetBoxSettings settings;
@@ -48,7 +20,7 @@ NetBoxDevice box_with(double rate_hz, int records, std::uint32_t first_ft = 0) {
 
 TEST(NetBoxDevice, WritesTheRecordsOfTheManual) {
   NetBoxDevice box = box_with(1000, 1, 1234567);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   const auto first = after(box, 7, {-0.123456, 0.25, 5.4321, -0.0015, 0, 0.098765});
   ASSERT_EQ(first.size(), 1u);
   EXPECT_EQ(hex(first[0].payload()), hex("00 00 00 01 00 12 d6 87 00 00 00 00 ff fe 1d c0 00 03 d0 90 00 52 e3 24 ff "
@@ -62,7 +34,7 @@ TEST(NetBoxDevice, WritesTheRecordsOfTheManual) {
 TEST(NetBoxDevice, IsSilentUntilAskedAndAnswersTheAsker) {
   NetBoxDevice box = box_with(7000, 1);
   EXPECT_TRUE(after(box, 100).empty());
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   const auto datagrams = after(box, 3);
   ASSERT_EQ(datagrams.size(), 3u);
   EXPECT_EQ(datagrams[0].peer, kClient);
@@ -80,7 +52,7 @@ TEST(NetBoxDevice, BuffersForCommandThreeOnly) {
   EXPECT_EQ(rdt(buffered[1], 39), 80u);
   EXPECT_EQ(ft(buffered[1], 39) - ft(buffered[1], 0), 39u);
   EXPECT_EQ(buffered[1].at, Instant(79));
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   const auto single = after(box, 5);
   ASSERT_EQ(single.size(), 5u);
   EXPECT_EQ(single[0].size, 36u);
@@ -101,9 +73,9 @@ TEST(NetBoxDevice, HonoursTheSampleCountWithAPartialLastDatagram) {
 
 TEST(NetBoxDevice, NewestCommandWinsAlsoFromAnotherPeer) {
   NetBoxDevice box = box_with(7000, 1);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   after(box, 5);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), 8);
+  box.receive(kRealTime, 8);
   const auto datagrams = after(box, 2);
   ASSERT_EQ(datagrams.size(), 2u);
   EXPECT_EQ(datagrams[0].peer, 8u);
@@ -133,7 +105,7 @@ TEST(NetBoxDevice, RoundsTheRateUpAndStridesByTheDivisor) {
   } cases[] = {{7000, 1}, {3501, 1}, {3500, 2}, {1000, 7}, {150, 46}, {99, 70}, {1, 7000}};
   for (const auto& rate : cases) EXPECT_EQ(box_with(rate.asked, 1).divisor(), rate.divisor) << rate.asked;
   NetBoxDevice box = box_with(1000, 1);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   const auto datagrams = after(box, 7000);
   ASSERT_EQ(datagrams.size(), 1000u);
   EXPECT_EQ(ft(datagrams[999]) - ft(datagrams[998]), 7u);
@@ -141,7 +113,7 @@ TEST(NetBoxDevice, RoundsTheRateUpAndStridesByTheDivisor) {
 
 TEST(NetBoxDevice, InternalSequenceWraps) {
   NetBoxDevice box = box_with(7000, 1, 0xffffffff);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   const auto datagrams = after(box, 2);
   EXPECT_EQ(ft(datagrams[0]), 0xffffffffu);
   EXPECT_EQ(ft(datagrams[1]), 0u);
@@ -149,30 +121,29 @@ TEST(NetBoxDevice, InternalSequenceWraps) {
 
 TEST(NetBoxDevice, SoftwareBiasTakesThePresentLoadAndTheStreamGoesOn) {
   NetBoxDevice box = box_with(7000, 1);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
+  box.receive(kRealTime, kClient);
   after(box, 3, {0.5, 0, 2, 0, 0.01, 0});
-  box.receive(bytes("12 34 00 42 00 00 00 00"), 99);
+  box.receive(kBias, 99);
   const auto datagrams = after(box, 1, {0.5, 0, 3, 0, 0.01, 0});
   ASSERT_EQ(datagrams.size(), 1u);
   EXPECT_EQ(datagrams[0].peer, kClient);
   EXPECT_EQ(rdt(datagrams[0]), 4u);
   EXPECT_EQ(counts(datagrams[0], 0), 0);
   EXPECT_EQ(counts(datagrams[0], 2), 1'000'000);
-  box.receive(bytes("12 34 00 42 00 00 00 00"), kClient);
+  box.receive(kBias, kClient);
   EXPECT_EQ(counts(after(box, 1, {0.5, 0, 4, 0, 0.01, 0})[0], 2), 1'000'000) << "a second bias replaces the first";
 }
 
 TEST(NetBoxDevice, SaturationClampsAndFlags) {
   NetBoxDevice box = box_with(7000, 1);
-  box.receive(bytes("12 34 00 02 00 00 00 00"), kClient);
-  const auto high = after(box, 1, {0, 0, 75, 0, 0, 0});
-  EXPECT_EQ(counts(high[0], 2), 60'000'000);
-  EXPECT_EQ(word(high[0], 0, 8), 0x80020000u);
-  const auto low = after(box, 1, {-21, 0, 0, 0, 0, 0});
-  EXPECT_EQ(counts(low[0], 0), -20'000'000);
-  EXPECT_EQ(word(low[0], 0, 8), 0x80020000u);
+  box.receive(kRealTime, kClient);
+  for (const auto& [wrench, axis, clamped] :
+       {std::tuple{Wrench{0, 0, 75, 0, 0, 0}, 2u, 60'000'000}, {Wrench{-21, 0, 0, 0, 0, 0}, 0u, -20'000'000}}) {
+    const auto beyond = after(box, 1, wrench);
+    EXPECT_EQ(counts(beyond[0], axis), clamped);
+    EXPECT_EQ(word(beyond[0], 0, 8), 0x80020000u);
+  }
   EXPECT_EQ(word(after(box, 1)[0], 0, 8), 0u) << "not latched";
 }
 
-}  // namespace device_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::device_test

@@ -10,28 +10,22 @@
 
 #include "drivers/sim/physics/motor.hpp"
 #include "drivers/sim/truth_log.hpp"
-#include "test/drivers/sim/hex.hpp"
+#include "test/drivers/sim/fault_words.hpp"
+#include "test/drivers/sim/netbox/box.hpp"
 
-namespace kphi::sim {
-namespace fault_injector_test {
+namespace kphi::sim::fault_injector_test {
 
 using namespace std::chrono_literals;
-using test::bytes;
+using namespace test;
 using Keep = FaultInjector::Keep;
 
-const auto kRealTime = bytes("12 34 00 02 00 00 00 00");
 constexpr Peer kHost = 7;
-using Entries = std::vector<FaultEntry>;
+using Entries = std::vector<std::string>;
 
 struct Bench {
   explicit Bench(const Entries& entries, std::uint64_t seed = 1, Keep keep = Keep::samples)
-      : wire(box, script(entries), seed, keep) {
+      : wire(box, fault_script(entries), seed, keep) {
     wire.request(kRealTime, kHost, Instant{0});
-  }
-  static FaultScript script(const Entries& entries) {
-    FaultScript faults;
-    for (const auto& entry : entries) faults.push_back(fault_of(entry));
-    return faults;
   }
   /// Ticks on, taking what has arrived after each `step` ticks.
   std::vector<Datagram> run(int ticks, int step = 1) {
@@ -46,21 +40,11 @@ struct Bench {
     }
     return all;
   }
-  NetBoxDevice box{[] {
-    NetBoxSettings settings;
-    settings.rate_hz = 1000;
-    return settings;
-  }()};
+  NetBoxDevice box = box_that([](NetBoxSettings& settings) { settings.rate_hz = 1000; });
   FaultInjector wire;
   std::int64_t tick = 0;
   Instant now{0};
 };
-
-std::uint32_t rdt(const Datagram& d) { return static_cast<std::uint32_t>(d.bytes[2] << 8 | d.bytes[3]); }
-std::uint32_t ft(const Datagram& d) {
-  return static_cast<std::uint32_t>(d.bytes[4]) << 24 |
-         static_cast<std::uint32_t>(d.bytes[5] << 16 | d.bytes[6] << 8 | d.bytes[7]);
-}
 
 TEST(FaultInjector, WithoutFaultsPassesAllAtOnce) {
   Bench bench(Entries{});
@@ -73,14 +57,14 @@ TEST(FaultInjector, WithoutFaultsPassesAllAtOnce) {
 }
 
 TEST(FaultInjector, LosesAtMostAsManyAsTold) {
-  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0.1"}, {"count", "5"}}});
+  Bench bench({"loss at_s=0.1 count=5"});
   EXPECT_EQ(bench.run(7000).size(), 995u);
   EXPECT_EQ(bench.wire.truth().dropped, 5u);
   EXPECT_EQ(bench.wire.truth().records_dropped, 5u);
 }
 
 TEST(FaultInjector, LosesInBursts) {
-  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0"}, {"for_s", "10"}, {"p", "0.02"}, {"burst", "6"}}});
+  Bench bench({"loss at_s=0 for_s=10 p=0.02 burst=6"});
   const auto arrived = bench.run(70000);
   for (std::size_t i = 1; i < arrived.size(); ++i) {
     const std::uint32_t lost = rdt(arrived[i]) - rdt(arrived[i - 1]) - 1;
@@ -90,14 +74,13 @@ TEST(FaultInjector, LosesInBursts) {
 }
 
 TEST(FaultInjector, GilbertElliottLosesItsShare) {
-  Bench bench(
-      Entries{{{"kind", "gilbert"}, {"at_s", "0"}, {"for_s", "60"}, {"p_good_bad", "0.01"}, {"p_bad_good", "0.09"}}});
+  Bench bench({"gilbert at_s=0 for_s=60 p_good_bad=0.01 p_bad_good=0.09"});
   bench.run(420000, 70);
   EXPECT_NEAR(static_cast<double>(bench.wire.truth().dropped), 6000, 1000) << "a tenth of the time is bad";
 }
 
 TEST(FaultInjector, DuplicatesLater) {
-  Bench bench(Entries{{{"kind", "duplicate"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.0105"}}});
+  Bench bench({"duplicate at_s=0 count=1 delay_s=0.0105"});
   const auto arrived = bench.run(700);
   ASSERT_EQ(arrived.size(), 101u);
   EXPECT_EQ(rdt(arrived[11]), 1u);
@@ -107,7 +90,7 @@ TEST(FaultInjector, DuplicatesLater) {
 }
 
 TEST(FaultInjector, LetsTheNextOnesOvertake) {
-  Bench bench(Entries{{{"kind", "reorder"}, {"at_s", "0"}, {"count", "1"}, {"depth", "3"}}});
+  Bench bench({"reorder at_s=0 count=1 depth=3"});
   const auto arrived = bench.run(70);
   EXPECT_EQ(rdt(arrived[2]), 4u);
   EXPECT_EQ(rdt(arrived[3]), 1u);
@@ -116,7 +99,7 @@ TEST(FaultInjector, LetsTheNextOnesOvertake) {
 }
 
 TEST(FaultInjector, HoldsNothingBackLongerThanTold) {
-  Bench bench(Entries{{{"kind", "reorder"}, {"at_s", "0"}, {"count", "1"}, {"depth", "900"}, {"delay_s", "0.02"}}});
+  Bench bench({"reorder at_s=0 count=1 depth=900 delay_s=0.02"});
   const auto arrived = bench.run(700);
   const auto first = std::find_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return rdt(d) == 1; });
   ASSERT_NE(first, arrived.end());
@@ -124,8 +107,7 @@ TEST(FaultInjector, HoldsNothingBackLongerThanTold) {
 }
 
 TEST(FaultInjector, DelaysInOrder) {
-  Bench bench(
-      Entries{{{"kind", "delay"}, {"at_s", "0"}, {"for_s", "0.05"}, {"delay_s", "0.02"}, {"jitter_s", "0.01"}}});
+  Bench bench({"delay at_s=0 for_s=0.05 delay_s=0.02 jitter_s=0.01"});
   const auto arrived = bench.run(1400);
   ASSERT_EQ(arrived.size(), 200u);
   for (std::size_t i = 1; i < arrived.size(); ++i) {
@@ -137,12 +119,7 @@ TEST(FaultInjector, DelaysInOrder) {
 }
 
 TEST(FaultInjector, JittersByAnExponentialAndSomeSpikes) {
-  Bench bench(Entries{{{"kind", "jitter"},
-                       {"at_s", "0"},
-                       {"for_s", "100"},
-                       {"mean_s", "0.00002"},
-                       {"p", "0.01"},
-                       {"spike_s", "0.0009"}}});
+  Bench bench({"jitter at_s=0 for_s=100 mean_s=0.00002 p=0.01 spike_s=0.0009"});
   const auto arrived = bench.run(70000);
   double sum = 0;
   int late = 0;
@@ -157,11 +134,8 @@ TEST(FaultInjector, JittersByAnExponentialAndSomeSpikes) {
 }
 
 TEST(FaultInjector, ShortBlocksLackTheirEnd) {
-  NetBoxSettings settings;
-  settings.records_per_datagram = 10;
-  NetBoxDevice box(settings);
-  FaultInjector wire(box, Bench::script({{{"kind", "short_block"}, {"at_s", "0"}, {"count", "2"}, {"records", "15"}}}),
-                     1);
+  NetBoxDevice box = box_that([](NetBoxSettings& settings) { settings.records_per_datagram = 10; });
+  FaultInjector wire(box, fault_script({"short_block at_s=0 count=2 records=15"}), 1);
   wire.request(bytes("12 34 00 03 00 00 00 00"), kHost, Instant{0});
   for (int i = 1; i <= 30; ++i) wire.sample({Instant(i), {}});
   std::vector<std::size_t> sizes;
@@ -172,18 +146,18 @@ TEST(FaultInjector, ShortBlocksLackTheirEnd) {
 }
 
 TEST(FaultInjector, OverrunsAndChangesItsRate) {
-  Bench overrun(Entries{{{"kind", "overrun"}, {"at_s", "0.05"}, {"samples", "3"}}});
+  Bench overrun({"overrun at_s=0.05 samples=3"});
   const auto arrived = overrun.run(700);
   EXPECT_EQ(ft(arrived[50]), ft(arrived[49]) + 7 + 3);
   EXPECT_EQ(rdt(arrived[50]), rdt(arrived[49]) + 1);
   EXPECT_EQ(overrun.wire.truth().done.at(FaultKind::overrun), 1u);
-  Bench rate(Entries{{{"kind", "rate"}, {"at_s", "0.05"}, {"rate_hz", "500"}}});
+  Bench rate({"rate at_s=0.05 rate_hz=500"});
   EXPECT_EQ(rate.run(700).size(), 50u) << "a box whose stream stops with the write";
   EXPECT_EQ(rate.box.divisor(), 14);
 }
 
 TEST(FaultInjector, DriftsToItsAmount) {
-  Bench bench(Entries{{{"kind", "zero_drift"}, {"at_s", "1"}, {"axis", "2"}, {"amount", "0.5"}, {"tau_s", "2"}}});
+  Bench bench({"zero_drift at_s=1 axis=2 amount=0.5 tau_s=2"});
   bench.run(7000);
   EXPECT_EQ(bench.box.signal().counts()[2], 1'000'000);
   bench.run(14000, 70);
@@ -193,7 +167,7 @@ TEST(FaultInjector, DriftsToItsAmount) {
 }
 
 TEST(FaultInjector, MovesToAnotherAddressAndBack) {
-  Bench bench(Entries{{{"kind", "address"}, {"at_s", "0.05"}, {"for_s", "0.05"}, {"address", "10.1.2.3"}}});
+  Bench bench({"address at_s=0.05 for_s=0.05 address=10.1.2.3"});
   EXPECT_EQ(bench.wire.moved_to(), "");
   bench.run(400);
   EXPECT_EQ(bench.wire.moved_to(), "10.1.2.3");
@@ -204,11 +178,9 @@ TEST(FaultInjector, MovesToAnotherAddressAndBack) {
 }
 
 TEST(FaultInjector, SpoilsTagsAndLetters) {
-  Bench bench(Entries{{{"kind", "http_missing_tag"}, {"at_s", "0"}, {"for_s", "0.01"}, {"tag", "cfgcpf"}},
-                      {{"kind", "http_duplicate_tag"}, {"at_s", "0.02"}, {"for_s", "0.01"}, {"tag", "cfgcpf"}},
-                      {{"kind", "http_charset"}, {"at_s", "0.04"}, {"for_s", "0.01"}},
-                      {{"kind", "http_charset"}, {"at_s", "0.06"}, {"for_s", "0.01"}, {"utf16", "1"}},
-                      {{"kind", "http_missing_tag"}, {"at_s", "0.08"}, {"for_s", "0.01"}, {"tag", "nosuch"}}});
+  Bench bench({"http_missing_tag at_s=0 for_s=0.01 tag=cfgcpf", "http_duplicate_tag at_s=0.02 for_s=0.01 tag=cfgcpf",
+               "http_charset at_s=0.04 for_s=0.01", "http_charset at_s=0.06 for_s=0.01 utf16=1",
+               "http_missing_tag at_s=0.08 for_s=0.01 tag=nosuch"});
   const auto get = [&](Instant at) { return bench.wire.http("GET /netftapi2.xml HTTP/1.0", at).bytes; };
   const auto count = [](const std::string& text, const std::string& what) {
     int n = 0;
@@ -228,9 +200,8 @@ TEST(FaultInjector, SpoilsTagsAndLetters) {
 }
 
 TEST(FaultInjector, SplitsMergesAndShortensAnswersOverTcp) {
-  Bench bench(Entries{{{"kind", "tcp_split"}, {"at_s", "0"}, {"count", "1"}, {"size", "5"}},
-                      {{"kind", "tcp_merged"}, {"at_s", "0.02"}, {"count", "1"}, {"delay_s", "0.3"}},
-                      {{"kind", "tcp_short"}, {"at_s", "0.04"}, {"count", "1"}, {"size", "9"}}});
+  Bench bench({"tcp_split at_s=0 count=1 size=5", "tcp_merged at_s=0.02 count=1 delay_s=0.3",
+               "tcp_short at_s=0.04 count=1 size=9"});
   const auto ask = [&](Instant at) {
     std::string command(20, '\0');
     command[0] = 1;
@@ -248,7 +219,7 @@ TEST(FaultInjector, SplitsMergesAndShortensAnswersOverTcp) {
 }
 
 TEST(FaultInjector, HoldsThenBursts) {
-  Bench bench(Entries{{{"kind", "hold"}, {"at_s", "0.1"}, {"for_s", "0.2"}}});
+  Bench bench({"hold at_s=0.1 for_s=0.2"});
   EXPECT_EQ(bench.run(2099).size(), 100u);
   EXPECT_EQ(bench.wire.next_arrival(), 300ms);
   const auto burst = bench.run(1);
@@ -257,8 +228,7 @@ TEST(FaultInjector, HoldsThenBursts) {
 }
 
 TEST(FaultInjector, MakesUpWrongSizesAndForeigners) {
-  Bench bench(Entries{{{"kind", "wrong_size"}, {"at_s", "0"}, {"count", "2"}, {"size", "1476"}},
-                      {{"kind", "foreign_source"}, {"at_s", "0.05"}, {"count", "3"}}});
+  Bench bench({"wrong_size at_s=0 count=2 size=1476", "foreign_source at_s=0.05 count=3"});
   const auto arrived = bench.run(700);
   EXPECT_EQ(std::count_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return d.size == 1476; }), 2);
   EXPECT_EQ(std::count_if(arrived.begin(), arrived.end(), [](const Datagram& d) { return d.foreign; }), 3);
@@ -269,21 +239,21 @@ TEST(FaultInjector, MakesUpWrongSizesAndForeigners) {
 }
 
 TEST(FaultInjector, LosesDoublesAndDelaysStarts) {
-  Bench lost(Entries{{{"kind", "lost_start"}, {"at_s", "0"}, {"count", "1"}}});
+  Bench lost({"lost_start at_s=0 count=1"});
   EXPECT_TRUE(lost.run(70).empty());
   lost.wire.request(kRealTime, kHost, lost.now);
   EXPECT_EQ(lost.run(70).size(), 10u);
-  Bench doubled(Entries{{{"kind", "doubled_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.005"}}});
+  Bench doubled({"doubled_start at_s=0 count=1 delay_s=0.005"});
   const auto arrived = doubled.run(70);
   EXPECT_EQ(rdt(arrived[4]), 5u);
   EXPECT_EQ(rdt(arrived[5]), 1u);
-  Bench delayed(Entries{{{"kind", "delayed_start"}, {"at_s", "0"}, {"count", "1"}, {"delay_s", "0.005"}}});
+  Bench delayed({"delayed_start at_s=0 count=1 delay_s=0.005"});
   EXPECT_EQ(delayed.run(70).size(), 5u + 1u);
   EXPECT_EQ(delayed.wire.truth().done.at(FaultKind::delayed_start), 1u);
 }
 
 TEST(FaultInjector, AStreamTakenOverLeavesOnlySilence) {
-  Bench bench(Entries{{{"kind", "taken_over"}, {"at_s", "0.1"}}});
+  Bench bench({"taken_over at_s=0.1"});
   EXPECT_EQ(bench.run(7000).size(), 100u);
   EXPECT_EQ(bench.wire.truth().to_others, 901u) << "from 0.1 s to 1 s, both included";
   bench.wire.request(kRealTime, kHost, bench.now);
@@ -291,13 +261,13 @@ TEST(FaultInjector, AStreamTakenOverLeavesOnlySilence) {
 }
 
 TEST(FaultInjector, RebootsWithAndWithoutTheStream) {
-  Bench with(Entries{{{"kind", "reboot"}, {"at_s", "0.1"}, {"down_s", "0.1"}, {"resume", "true"}}});
+  Bench with({"reboot at_s=0.1 down_s=0.1 resume=true"});
   const auto arrived = with.run(7000);
   EXPECT_EQ(arrived.size(), 100u + 801u);
   EXPECT_EQ(rdt(arrived[100]), 1u);
   EXPECT_EQ(ft(arrived[100]), 0u);
   EXPECT_EQ(arrived[100].boot, 1u);
-  Bench without(Entries{{{"kind", "reboot"}, {"at_s", "0.1"}, {"down_s", "0.1"}}});
+  Bench without({"reboot at_s=0.1 down_s=0.1"});
   EXPECT_EQ(without.run(1000).size(), 100u);
   without.wire.request(kRealTime, kHost, without.now);
   EXPECT_EQ(without.wire.truth().unheard, 1u) << "it is still down";
@@ -308,21 +278,21 @@ TEST(FaultInjector, RebootsWithAndWithoutTheStream) {
 }
 
 TEST(FaultInjector, StallsJumpsAndWraps) {
-  Bench stall(Entries{{{"kind", "stall"}, {"at_s", "0.05"}, {"for_s", "0.05"}}});
+  Bench stall({"stall at_s=0.05 for_s=0.05"});
   const auto stalled = stall.run(700);
   EXPECT_EQ(ft(stalled[60]), ft(stalled[90]));
   EXPECT_EQ(rdt(stalled[99]), 100u);
-  Bench jump(Entries{{{"kind", "ft_jump_back"}, {"at_s", "0.05"}, {"samples", "100"}}});
+  Bench jump({"ft_jump_back at_s=0.05 samples=100"});
   const auto jumped = jump.run(700);
   EXPECT_EQ(ft(jumped[50]), ft(jumped[49]) + 7 - 100);
-  Bench wrap(Entries{{{"kind", "wrap"}, {"at_s", "0"}, {"samples", "70"}}});
+  Bench wrap({"wrap at_s=0 samples=70"});
   const auto wrapped = wrap.run(700);
   EXPECT_EQ(ft(wrapped[0]), 0u - 70u);
   EXPECT_EQ(ft(wrapped[10]), 0u);
 }
 
 TEST(FaultInjector, ASkewedBoxTakesMoreSamplesAtItsOwnTimes) {
-  Bench bench(Entries{{{"kind", "clock_skew"}, {"at_s", "0"}, {"ppm", "500"}}});
+  Bench bench({"clock_skew at_s=0 ppm=500"});
   const auto arrived = bench.run(70000, 70);
   EXPECT_EQ(arrived.size(), 10005u);
   const double period_us = 1e6 * to_seconds(arrived[10000].sampled[0] - arrived[0].sampled[0]) / 10000;
@@ -333,10 +303,8 @@ TEST(FaultInjector, ASkewedBoxTakesMoreSamplesAtItsOwnTimes) {
 }
 
 TEST(FaultInjector, StatusSaturationAndUnits) {
-  Bench bench(Entries{{{"kind", "status"}, {"at_s", "0.02"}, {"for_s", "0.01"}, {"bits", "0x80400000"}},
-                      {{"kind", "status"}, {"at_s", "0.04"}, {"for_s", "0.01"}, {"bits", "0x10"}, {"latched", "1"}},
-                      {{"kind", "saturation"}, {"at_s", "0.06"}, {"for_s", "0.01"}, {"axes", "4"}},
-                      {{"kind", "units"}, {"at_s", "0.08"}, {"force_unit", "6"}}});
+  Bench bench({"status at_s=0.02 for_s=0.01 bits=0x80400000", "status at_s=0.04 for_s=0.01 bits=0x10 latched=1",
+               "saturation at_s=0.06 for_s=0.01 axes=4", "units at_s=0.08 force_unit=6"});
   const auto arrived = bench.run(700);
   const auto status = [&](std::size_t i) {
     return arrived[i].bytes[8] << 24 | arrived[i].bytes[9] << 16 | arrived[i].bytes[11];
@@ -351,11 +319,9 @@ TEST(FaultInjector, StatusSaturationAndUnits) {
 }
 
 TEST(FaultInjector, SpoilsThePages) {
-  Bench bench(Entries{{{"kind", "http_status"}, {"at_s", "0"}, {"count", "1"}, {"code", "500"}},
-                      {{"kind", "http_truncated"}, {"at_s", "0.01"}, {"for_s", "0.01"}, {"size", "20"}},
-                      {{"kind", "http_oversized"}, {"at_s", "0.03"}, {"for_s", "0.01"}, {"size", "65536"}},
-                      {{"kind", "http_slow"}, {"at_s", "0.05"}, {"for_s", "0.01"}, {"delay_s", "2"}},
-                      {{"kind", "http_refused"}, {"at_s", "0.07"}, {"for_s", "0.01"}}});
+  Bench bench({"http_status at_s=0 count=1 code=500", "http_truncated at_s=0.01 for_s=0.01 size=20",
+               "http_oversized at_s=0.03 for_s=0.01 size=65536", "http_slow at_s=0.05 for_s=0.01 delay_s=2",
+               "http_refused at_s=0.07 for_s=0.01"});
   const auto get = [&](Instant at) { return bench.wire.http("GET /netftapi2.xml HTTP/1.0", at); };
   EXPECT_EQ(get(0ms).bytes.substr(0, 12), "HTTP/1.0 500");
   EXPECT_EQ(get(1ms).bytes.substr(0, 12), "HTTP/1.0 200");
@@ -368,13 +334,10 @@ TEST(FaultInjector, SpoilsThePages) {
 }
 
 std::vector<std::uint8_t> everything(std::uint64_t seed, int step) {
-  Bench bench(Entries{{{"kind", "loss"}, {"at_s", "0.1"}, {"for_s", "1"}, {"p", "0.1"}, {"burst", "2"}},
-                      {{"kind", "reorder"}, {"at_s", "0.1"}, {"for_s", "1"}, {"p", "0.1"}, {"depth", "3"}},
-                      {{"kind", "duplicate"}, {"at_s", "0.3"}, {"for_s", "1"}, {"p", "0.1"}, {"delay_s", "0.0123"}},
-                      {{"kind", "delay"}, {"at_s", "0.5"}, {"for_s", "1"}, {"delay_s", "0.01"}, {"jitter_s", "0.01"}},
-                      {{"kind", "wrong_size"}, {"at_s", "0.5"}, {"for_s", "1"}, {"p", "0.1"}, {"size", "37"}},
-                      {{"kind", "clock_skew"}, {"at_s", "0"}, {"ppm", "60"}, {"wander_ppm", "1"}},
-                      {{"kind", "reboot"}, {"at_s", "1.6"}, {"down_s", "0.1"}, {"resume", "1"}}},
+  Bench bench({"loss at_s=0.1 for_s=1 p=0.1 burst=2", "reorder at_s=0.1 for_s=1 p=0.1 depth=3",
+               "duplicate at_s=0.3 for_s=1 p=0.1 delay_s=0.0123", "delay at_s=0.5 for_s=1 delay_s=0.01 jitter_s=0.01",
+               "wrong_size at_s=0.5 for_s=1 p=0.1 size=37", "clock_skew at_s=0 ppm=60 wander_ppm=1",
+               "reboot at_s=1.6 down_s=0.1 resume=1"},
               seed);
   std::vector<std::uint8_t> out;
   for (const Datagram& d : bench.run(14000, step)) {
@@ -392,9 +355,7 @@ TEST(FaultInjector, SameSeedSameBytesAtTheSameTimes) {
 TEST(FaultInjector, DoesNotDependOnHowOftenItIsAsked) { EXPECT_EQ(everything(3, 1), everything(3, 500)); }
 
 TEST(FaultInjector, TellsTheTruthLineByLine) {
-  Bench bench(
-      {{{"kind", "loss"}, {"at_s", "0.1"}, {"count", "2"}}, {{"kind", "stall"}, {"at_s", "0.2"}, {"for_s", "0.1"}}}, 1,
-      Keep::datagrams);
+  Bench bench({"loss at_s=0.1 count=2", "stall at_s=0.2 for_s=0.1"}, 1, Keep::datagrams);
   bench.run(7000);
   std::istringstream lines(json_lines(bench.wire.truth()));
   std::vector<nlohmann::json> all;
@@ -407,5 +368,4 @@ TEST(FaultInjector, TellsTheTruthLineByLine) {
   EXPECT_EQ(std::count_if(all.begin() + 2, all.end() - 1, [](const auto& d) { return d["arrivals"] == 0; }), 2);
 }
 
-}  // namespace fault_injector_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::fault_injector_test

@@ -7,8 +7,7 @@
 
 #include "drivers/sim/netbox/device.hpp"
 
-namespace kphi::sim {
-namespace pages_test {
+namespace kphi::sim::pages_test {
 
 struct Answer {
   std::string status;
@@ -46,18 +45,19 @@ TEST(NetBoxPages, ConfigurationHasTheCapturedElementsInOrder) {
 TEST(NetBoxPages, DefaultsAreAMini40InNewtons) {
   NetBoxDevice box{NetBoxSettings{}};
   const Answer answer = get(box, "/netftapi2.xml?index=0");
-  const auto text = [&](const char* name) { return std::string(answer.xml.child("netft").child_value(name)); };
-  EXPECT_EQ(text("cfgmr"), "20;20;60;1;1;1");
-  EXPECT_EQ(text("cfgcpf"), "1000000");
-  EXPECT_EQ(text("cfgcpt"), "1000000");
-  EXPECT_EQ(text("scfgfu"), "N");
-  EXPECT_EQ(text("scfgtu"), "Nm");
-  EXPECT_EQ(text("comrdte"), "Enabled");
-  EXPECT_EQ(text("comrdtrate"), "7000");
-  EXPECT_EQ(text("comrdtbsiz"), "40");
-  EXPECT_EQ(text("runrate"), "7000");
-  EXPECT_EQ(text("runstat"), "0x00000000");
-  EXPECT_EQ(text("mcx"), "-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1");
+  constexpr std::pair<const char*, const char*> kDefaults[] = {
+      {"cfgmr", "20;20;60;1;1;1"},
+      {"cfgcpf", "1000000"},
+      {"cfgcpt", "1000000"},
+      {"scfgfu", "N"},
+      {"scfgtu", "Nm"},
+      {"comrdte", "Enabled"},
+      {"comrdtrate", "7000"},
+      {"comrdtbsiz", "40"},
+      {"runrate", "7000"},
+      {"runstat", "0x00000000"},
+      {"mcx", "-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1;-1"}};
+  for (const auto& [name, content] : kDefaults) EXPECT_STREQ(answer.xml.child("netft").child_value(name), content);
 }
 
 TEST(NetBoxPages, ShowTheQuantisedRateAndThePeaks) {
@@ -98,5 +98,4 @@ TEST(NetBoxPages, EverythingElseIsNotFound) {
   }
 }
 
-}  // namespace pages_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::pages_test

@@ -7,8 +7,7 @@
 #include "base/random.hpp"
 #include "drivers/sim/physics/motor.hpp"
 
-namespace kphi::sim {
-namespace signal_test {
+namespace kphi::sim::signal_test {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -89,5 +88,4 @@ TEST(NetBoxSignal, AxiaHoldsTheSaturationBit) {
   EXPECT_FALSE(signal.saturated());
 }
 
-}  // namespace signal_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::signal_test

@@ -3,11 +3,9 @@
 #include "drivers/sim/netbox/device.hpp"
 #include "test/drivers/sim/hex.hpp"
 
-namespace kphi::sim {
-namespace tcp_test {
+namespace kphi::sim::tcp_test {
 
-using test::bytes;
-using test::hex;
+using namespace test;
 
 std::string text(std::string_view spelt) {
   const auto data = bytes(spelt);
@@ -54,5 +52,4 @@ TEST_F(NetBoxTcp, UnknownCommandsAreIgnored) {
   EXPECT_EQ(ask("02 00000000000000 00000000000000 00 0000 0000"), "");  // WRITETRANSFORM
 }
 
-}  // namespace tcp_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::tcp_test

@@ -9,19 +9,22 @@
 #include "drivers/sim/physics/motor.hpp"
 #include "drivers/sim/physics/plant.hpp"
 
-namespace kphi::sim {
-namespace physics_test {
+namespace kphi::sim::physics_test {
 
 /// The module's default tuning.
 MotorDrive at_speed(double speed) {
   return {MotorDrive::Mode::velocity, speed, 0.02, 0.9, 0, 0.006, 0.0043, 2.0e-7, 100};
 }
 
-constexpr MotorDrive kCoast{};
+constexpr MotorDrive kCoast{}, kBrake{.mode = MotorDrive::Mode::brake};
 
 /// The plant under the module's firmware, which measures without error.
 struct Stand : Plant {
   using Plant::Plant;
+  Stand(std::string_view propeller, double phi_deg, std::uint64_t seed, const PlantParameters& parameters = {})
+      : Plant(parameters, seed) {
+    mount(find_propeller(propeller), phi_deg);
+  }
   void step(const MotorDrive& drive) {
     last = control.step(drive, limits, {motor().speed, motor().supply_volts});
     Plant::step(last);
@@ -70,8 +73,7 @@ TEST(Physics, EverySpeedOfTheProfileIsReachedInFiftyMillisecondsAndHeldAfterTwoH
 
 TEST(Physics, SteadyThrustIsKOmegaSquaredAboveTheZero) {
   for (const double phi : {0.0, 45.0, 270.0}) {
-    Stand plant({}, 5);
-    plant.mount(find_propeller("5x3"), phi);
+    Stand plant("5x3", phi, 5);
     const double zero = mean_force(plant, kCoast, 2, 2);
     run(plant, at_speed(1500), 1);
     const double expected = thrust_coefficient(*find_propeller("5x3"), phi) * 1500 * 1500;
@@ -80,24 +82,21 @@ TEST(Physics, SteadyThrustIsKOmegaSquaredAboveTheZero) {
 }
 
 TEST(Physics, ReactionTorqueOpposesThePositiveTurn) {
-  Stand plant({}, 5);
-  plant.mount(find_propeller("6x2"), 0);
+  Stand plant("6x2", 0, 5);
   const double zero = mean_force(plant, kCoast, 5, 1);
   run(plant, at_speed(1500), 1);
   EXPECT_NEAR(mean_force(plant, at_speed(1500), 5, 1) - zero, -2.4e-8 * 1500 * 1500, 2e-4);
 }
 
 TEST(Physics, NegativeSpeedPushes) {
-  Stand plant({}, 5);
-  plant.mount(find_propeller("5x2"), 0);
+  Stand plant("5x2", 0, 5);
   run(plant, at_speed(-1000), 1);
   EXPECT_NEAR(plant.motor().speed, -1000, 1);
   EXPECT_LT(plant.thrust(), 0);
 }
 
 TEST(Physics, CoastingSlowsDownAndStopsWithoutDrawingCurrent) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x3"), 0);
+  Stand plant("5x3", 0, 2);
   run(plant, at_speed(2000), 1);
   double last = plant.motor().speed;
   for (int i = 0; i < 20; ++i) {
@@ -112,8 +111,7 @@ TEST(Physics, CoastingSlowsDownAndStopsWithoutDrawingCurrent) {
 }
 
 TEST(Physics, SteppingDownLiftsTheBusToTheLimitAndNoFurther) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("6x3"), 0);
+  Stand plant("6x3", 0, 2);
   run(plant, at_speed(1800), 1);
   double highest = 0;
   for (int i = 0; i < 7000; ++i) {
@@ -126,8 +124,7 @@ TEST(Physics, SteppingDownLiftsTheBusToTheLimitAndNoFurther) {
 }
 
 TEST(Physics, WithTheLimitTooHighSteppingDownLiftsTheBusFarAboveTheSupply) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("6x3"), 0);
+  Stand plant("6x3", 0, 2);
   plant.limits.volts_start = plant.limits.volts_limit = 100;
   run(plant, at_speed(1800), 1);
   double highest = 0;
@@ -139,8 +136,7 @@ TEST(Physics, WithTheLimitTooHighSteppingDownLiftsTheBusFarAboveTheSupply) {
 }
 
 TEST(Physics, WithTheVoltageLimitBelowTheSupplyTheMotorRunsAway) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x2"), 0);
+  Stand plant("5x2", 0, 2);
   plant.limits.volts_start = 10;
   plant.limits.volts_limit = 11;
   run(plant, at_speed(300), 2);
@@ -148,8 +144,7 @@ TEST(Physics, WithTheVoltageLimitBelowTheSupplyTheMotorRunsAway) {
 }
 
 TEST(Physics, ClosedLoopRisesInAboutTwentyMilliseconds) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x3"), 0);
+  Stand plant("5x3", 0, 2);
   run(plant, at_speed(1000), 1);
   int ticks = 0;
   for (; plant.motor().speed < 1000 + 0.63 * 100; ++ticks) {
@@ -161,8 +156,7 @@ TEST(Physics, ClosedLoopRisesInAboutTwentyMilliseconds) {
 }
 
 TEST(Physics, RedlineScalesTheVoltage) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x2"), 0);
+  Stand plant("5x2", 0, 2);
   plant.limits.redline_start = 900;
   plant.limits.redline_end = 1100;
   run(plant, at_speed(1500), 2);
@@ -172,13 +166,9 @@ TEST(Physics, RedlineScalesTheVoltage) {
 }
 
 TEST(Physics, SlewLimitHoldsTheVoltageBack) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x2"), 0);
+  Stand plant("5x2", 0, 2);
   plant.limits.slew = 100;
-  MotorDrive volts;
-  volts.mode = MotorDrive::Mode::volts;
-  volts.target = 5;
-  run(plant, volts, 0.02);
+  run(plant, MotorDrive{.mode = MotorDrive::Mode::volts, .target = 5}, 0.02);
   EXPECT_NEAR(plant.control.volts(), 2, 0.05);
 }
 
@@ -193,8 +183,7 @@ TEST(Physics, InputFilterSlowsTheCommandDown) {
 }
 
 TEST(Physics, ALockedRotorDrawsItsCurrentAndDoesNotTurn) {
-  Stand plant({}, 2);
-  plant.mount(find_propeller("5x2"), 0);
+  Stand plant("5x2", 0, 2);
   plant.upset({0, true});
   run(plant, at_speed(1000), 0.2);
   EXPECT_EQ(plant.motor().speed, 0);
@@ -209,27 +198,20 @@ TEST(Physics, ASagOfTheSupplyIsSeenAtTheModule) {
 }
 
 TEST(Physics, BrakeStopsFasterThanCoast) {
-  Stand coasting({}, 2), braking({}, 2);
-  for (Stand* plant : {&coasting, &braking}) {
-    plant->mount(find_propeller("5x3"), 0);
-    run(*plant, at_speed(1000), 1);
-  }
-  MotorDrive brake;
-  brake.mode = MotorDrive::Mode::brake;
+  Stand coasting("5x3", 0, 2), braking("5x3", 0, 2);
+  for (Stand* plant : {&coasting, &braking}) run(*plant, at_speed(1000), 1);
   run(coasting, kCoast, 0.1);
-  run(braking, brake, 0.1);
+  run(braking, kBrake, 0.1);
   EXPECT_LT(braking.motor().speed, 0.3 * coasting.motor().speed);
 }
 
 /// A campaign in small: up, steady, down into the limiter, brake, coast to rest.
 void exercise(Stand& plant, const std::function<void()>& each) {
-  MotorDrive brake;
-  brake.mode = MotorDrive::Mode::brake;
   for (const auto& [drive, seconds] : {std::pair{at_speed(1800), 1.0},
                                        {at_speed(900), 0.4},
                                        {kCoast, 0.2},
                                        {at_speed(-700), 0.5},
-                                       {brake, 0.1},
+                                       {kBrake, 0.1},
                                        {kCoast, 6.0}}) {
     for (int i = 0; i < seconds * kTicksPerSecond; ++i) {
       plant.step(drive);
@@ -245,8 +227,7 @@ TEST(Physics, EnergyIsConserved) {
   parameters.motor.turbulence = 0;
   const MotorParameters& p = parameters.motor;
   const PropellerTruth& propeller = *find_propeller("5x3");
-  Stand plant(parameters, 3);
-  plant.mount(&propeller, 0);
+  Stand plant("5x3", 0, 3, parameters);
   const double inertia = propeller.inertia_kg_m2 + p.rotor_inertia;
   double to_shaft = 0, to_air = 0, turned = 0, rubbed = 0;  // J, J, rad of either direction, J
   MotorState before = plant.motor();
@@ -270,8 +251,7 @@ TEST(Physics, EnergyIsConserved) {
 }
 
 TEST(Physics, TheStagePutsItsShareOfTheBusAcrossTheMotor) {
-  Stand plant({}, 3);
-  plant.mount(find_propeller("5x3"), 0);
+  Stand plant("5x3", 0, 3);
   double before = 0;
   exercise(plant, [&] {
     const MotorState& m = plant.motor();
@@ -286,8 +266,7 @@ TEST(Physics, TheStagePutsItsShareOfTheBusAcrossTheMotor) {
 TEST(Physics, TheSupplyGivesWhatItsResistanceOrItsLimitLets) {
   PlantParameters parameters;
   parameters.motor.supply_current_max = 15;
-  Stand plant(parameters, 3);
-  plant.mount(find_propeller("6x3"), 0);
+  Stand plant("6x3", 0, 3, parameters);
   bool limited = false, blocked = false;
   exercise(plant, [&] {
     const MotorState& m = plant.motor();
@@ -304,8 +283,7 @@ TEST(Physics, TheSupplyGivesWhatItsResistanceOrItsLimitLets) {
 TEST(Physics, SupplySagsByItsResistanceAndLimitsItsCurrent) {
   PlantParameters parameters;
   parameters.motor.supply_current_max = 8;
-  Stand plant(parameters, 3);
-  plant.mount(find_propeller("6x2"), 0);
+  Stand plant("6x2", 0, 3, parameters);
   run(plant, at_speed(2000), 1);
   EXPECT_LT(plant.motor().speed, 1900) << "this supply cannot give what 2000 rad/s take";
   EXPECT_NEAR(plant.motor().source_amps, 8, 0.2);
@@ -313,8 +291,7 @@ TEST(Physics, SupplySagsByItsResistanceAndLimitsItsCurrent) {
 }
 
 TEST(Physics, CoilWarmsUnderLoadAndCoolsAtRest) {
-  Stand plant({}, 3);
-  plant.mount(find_propeller("6x3"), 0);
+  Stand plant("6x3", 0, 3);
   run(plant, at_speed(1800), 10);
   const double hot = plant.motor().coil_celsius;
   EXPECT_GT(hot, 40);
@@ -416,5 +393,4 @@ TEST(Physics, VibrationStandsAtOncePerTurnAndAtTheBladePass) {
   }
 }
 
-}  // namespace physics_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::physics_test

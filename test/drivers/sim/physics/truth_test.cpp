@@ -5,8 +5,7 @@
 
 #include "compensation/units.hpp"
 
-namespace kphi::sim {
-namespace truth_test {
+namespace kphi::sim::truth_test {
 
 double k_rpm(std::string_view id, double phi) {
   return to_newtons_per_rpm2(ThrustCoefficient(thrust_coefficient(*find_propeller(id), phi)));
@@ -90,5 +89,4 @@ TEST(Truth, YamlGivesBackEveryDigit) {
   }
 }
 
-}  // namespace truth_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::truth_test

@@ -12,12 +12,13 @@
 #include "base/random.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "drivers/sim/usb/function.hpp"
+#include "test/drivers/sim/fault_words.hpp"
 #include "test/source_dir.hpp"
 
-namespace kphi::sim {
-namespace faults_test {
+namespace kphi::sim::faults_test {
 
 using namespace std::chrono_literals;
+using test::fault;
 
 std::string refusal(const std::string& text) {
   try {
@@ -166,29 +167,28 @@ TEST(MotorFaults, ReadsEveryKindAndLeavesTheLoadCellsAlone) {
 }
 
 TEST(SupplyFaults, AreReadFromAnEntry) {
-  const Fault late = fault_of({{"kind", "supply_late"}, {"at_s", "1.5"}, {"for_s", "2"}, {"delay_s", "0.55"}});
+  const Fault late = fault("supply_late at_s=1.5 for_s=2 delay_s=0.55");
   EXPECT_EQ(late.kind, FaultKind::supply_late);
   EXPECT_EQ(late.at, 1500ms);
   EXPECT_EQ(late.end(), 3500ms);
   EXPECT_EQ(late.delay, 550ms);
-  const Fault panel = fault_of({{"kind", "supply_panel"}, {"at_s", "1"}, {"register", "8"}, {"value", "1100"}});
+  const Fault panel = fault("supply_panel at_s=1 register=8 value=1100");
   EXPECT_EQ(panel.address, 8);
   EXPECT_EQ(panel.value, 1100);
-  const Fault crc = fault_of({{"kind", "supply_bad_crc"}, {"at_s", "0"}, {"count", "3"}, {"p", "0.5"}});
+  const Fault crc = fault("supply_bad_crc at_s=0 count=3 p=0.5");
   EXPECT_EQ(crc.count, 3u);
   EXPECT_EQ(crc.p, 0.5);
   EXPECT_EQ(crc.end(), kNever);
-  EXPECT_EQ(fault_of({{"kind", "supply_sag"}, {"at_s", "1"}, {"for_s", "1"}, {"volts", "4.5"}}).volts, 4.5);
+  EXPECT_EQ(fault("supply_sag at_s=1 for_s=1 volts=4.5").volts, 4.5);
 }
 
 TEST(UsbFaults, AreReadFromAnEntry) {
-  const Fault late = fault_of({{"kind", "ambient_late"}, {"at_s", "2"}, {"count", "3"}, {"delay_s", "0.55"}});
+  const Fault late = fault("ambient_late at_s=2 count=3 delay_s=0.55");
   EXPECT_EQ(late.kind, FaultKind::ambient_late);
   EXPECT_EQ(late.at, 2s);
   EXPECT_EQ(late.count, 3u);
   EXPECT_EQ(late.delay, 550ms);
-  const Fault byte =
-      fault_of({{"kind", "ambient_reads_as"}, {"at_s", "0"}, {"for_s", "1"}, {"register", "137"}, {"value", "106"}});
+  const Fault byte = fault("ambient_reads_as at_s=0 for_s=1 register=137 value=106");
   EXPECT_EQ(byte.address, 137);
   EXPECT_EQ(byte.value, 106);
   EXPECT_EQ(byte.end(), 1s);
@@ -401,5 +401,4 @@ TEST(Faults, ActInTheirWindowAndThatManyTimes) {
   EXPECT_EQ(fault.end(), kNever);
 }
 
-}  // namespace faults_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::faults_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace kphi::sim {
-namespace circuit_test {
+namespace kphi::sim::circuit_test {
 
 constexpr double kTick = 1.0 / 7000;
 
@@ -110,5 +109,4 @@ TEST(SupplyCircuit, ShowsItsMeterWithTheLagOfAMeter) {
   EXPECT_NEAR(circuit.shown_amps(), 2, 0.02);
 }
 
-}  // namespace circuit_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::circuit_test

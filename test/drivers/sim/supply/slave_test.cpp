@@ -7,12 +7,10 @@
 
 #include "test/drivers/sim/hex.hpp"
 
-namespace kphi::sim {
-namespace slave_test {
+namespace kphi::sim::slave_test {
 
 using namespace std::chrono_literals;
-using test::bytes;
-using test::hex;
+using namespace test;
 
 TEST(ModbusCrc, HasThePublishedCheckValue) {
   const std::string digits = "123456789";
@@ -352,5 +350,4 @@ TEST(SupplySlave, SurvivesAnyRequest) {
   }
 }
 
-}  // namespace slave_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::slave_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace kphi::sim {
-namespace bme280_test {
+namespace kphi::sim::bme280_test {
 
 using namespace std::chrono_literals;
 
@@ -86,5 +85,4 @@ TEST(SimulatedBme280, TakesSeveralRegistersInOneWrite) {
   EXPECT_EQ(sensor.peek(0xF4, 10ms), 0xB5);
 }
 
-}  // namespace bme280_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::bme280_test

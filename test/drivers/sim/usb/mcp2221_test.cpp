@@ -1,12 +1,10 @@
 #include "drivers/sim/usb/mcp2221.hpp"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "base/random.hpp"
 
-namespace kphi::sim {
-namespace mcp2221_test {
+namespace kphi::sim::mcp2221_test {
 
 using namespace std::chrono_literals;
 using Bytes = std::vector<std::uint8_t>;
@@ -163,5 +161,4 @@ TEST_F(SimulatedMcp2221Test, SurvivesPacketsOfAnyLength) {
   }
 }
 
-}  // namespace mcp2221_test
-}  // namespace kphi::sim
+}  // namespace kphi::sim::mcp2221_test

@@ -8,6 +8,10 @@
 namespace kphi::soak {
 namespace {
 
+using namespace std::chrono_literals;
+
+constexpr Duration kFresh = 250ms;
+
 const Story::Stream* stream_of(const Story& story, const results::RunRecording& run) {
   if (run.phases.empty()) return nullptr;
   const Story::Stream* found = nullptr;
@@ -59,7 +63,50 @@ void check_numbers(const FileOfRun& file, const Story::Stream& stream, const net
   if (account.malformed > stream.malformed.size()) compare("malformed", account.malformed, stream.malformed.size());
 }
 
+constexpr Duration kUnjudged = 20ms;  ///< at the end of a run, when the guard has stood down
+/// Of a Net Box: summary, latch, saturation, and what concerns its networks only.
+constexpr std::uint32_t kBorne =
+    0x80010000u | 1u << 17 | 1u << 18 | 1u << 19 | 1u << 20 | 1u << 21 | 1u << 22 | 1u << 1;
+
+/// When the first sample came that was one too many.
+std::optional<Instant> one_too_many(const results::RunRecording& run, int patience) {
+  int on_end = 0;
+  for (const auto& sample : run.load_cell) {
+    on_end = (sample.status & ~kBorne) != 0 ? on_end + 1 : 0;
+    if (on_end > patience) return Instant(sample.arrival_ns);
+  }
+  return std::nullopt;
+}
+
+bool was_judged(const results::RunRecording& run, Instant at) {
+  return !run.phases.empty() && at < Instant(run.phases.back().time_ns) - kUnjudged;
+}
+
 }  // namespace
+
+void check_absence(const Evidence& evidence, Lines& wrong) {
+  if (!evidence.mixture.absence || !evidence.story.comeback) return;
+  const Absence& absence = *evidence.mixture.absence;
+  const Comeback& seen = *evidence.story.comeback;
+  const auto has = [&](EventKind kind) {
+    return std::find(seen.events.begin(), seen.events.end(), kind) != seen.events.end();
+  };
+  const auto unless = [&](bool right, const std::string& what) {
+    if (!right) wrong.push_back(fmt::format("absence: {} (\"{}\")", what, seen.failure));
+  };
+  unless(has(EventKind::silent), "nobody noticed that the stream fell silent");
+  if (!absence.returns) {
+    unless(seen.starts == 1, fmt::format("{} starts of a stream that another client has taken", seen.starts));
+    unless(has(EventKind::taken_over), "the event does not say that the stream was taken over");
+    return unless(!seen.failure.empty(), "the stream of another client counts as working");
+  }
+  unless(seen.newest + kFresh >= seen.ended,
+         fmt::format("the box answers from {:.3f} s on, the newest sample of {:.3f} s is from {:.3f} s",
+                     to_seconds(absence.ends), to_seconds(seen.ended), to_seconds(seen.newest)));
+  unless(seen.failure.empty(), "the stream counts as failed although the box is back");
+  unless(has(absence.is_started ? EventKind::reconnected : EventKind::resumed),
+         "no event says that the stream came back");
+}
 
 void check_account(const Evidence& evidence, Lines& wrong) {
   if (evidence.wire == nullptr) return;
@@ -70,6 +117,27 @@ void check_account(const Evidence& evidence, Lines& wrong) {
                                               netbox::StreamSettings{}.reorder_patience);
     check_records(file, truth, wrong);
     if (file.path.extension() != ".part") check_numbers(file, *stream, truth, wrong);
+  }
+}
+
+void check_status(const Evidence& evidence, const Reaches& reaches, Lines& wrong) {
+  const Story& story = evidence.story;
+  for (const FileOfRun& file : evidence.files) {
+    const auto noticed =
+        file.inherited ? std::nullopt : one_too_many(file.run, evidence.config.netbox.records_per_datagram);
+    if (!noticed) continue;
+    if (file.run.outcome == results::Outcome::complete) {
+      if (was_judged(file.run, *noticed))
+        wrong.push_back(fmt::format("status: {} is complete, though the box reported an error", file.name()));
+      continue;
+    }
+    const bool alone = evidence.killed() || reaches.line_silenced(*noticed - kOwnTimeout, *noticed + kOwnTimeout);
+    const Instant limit = *noticed + (alone ? kOwnTimeout : kHeard);
+    if (story.stages.empty() || story.stages.back().at <= limit) continue;
+    wrong.push_back(
+        fmt::format("status: {}: coasts {:.0f} ms after the box reported an error in more samples than a "
+                    "datagram holds",
+                    file.name(), 1e3 * to_seconds(story.stages.back().at - *noticed)));
   }
 }
 
