@@ -145,7 +145,7 @@ double mean_thrust(LoadCell& cell, std::uint64_t records) {
 }
 
 void bias(bool stops_stream) {
-  LiveStream s({.time_scale = 4, .quirks = {.bias_stops_stream = stops_stream}});
+  LiveStream s({.quirks = {.bias_stops_stream = stops_stream}});
   s.cell.start();
   EXPECT_GT(std::abs(mean_thrust(s.cell, 2000)), 0.05) << "there was something to take away";
   // The box takes one noisy sample as its zero: what remains is its noise, and after a bad one kphi asks again.
