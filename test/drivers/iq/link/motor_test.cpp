@@ -280,7 +280,8 @@ TEST(FailedConnection, LeavesCoastAsTheOnlyMotionCommand) {
                                        m.silent.insert({5, 16});
                                      },
                                      [](Module& m) {
-                                       m.values[{50, 0}] = fake::u8(3), m.ignore_sets = true;
+                                       m.values[{50, 0}] = fake::u8(3);
+                                       m.ignore_sets = true;
                                      }};
   for (const auto& spoil : spoils) {
     ModuleOnALine line(spoil);
