@@ -14,7 +14,7 @@ class FaultyCampaign : public CampaignOnBench {
     config_ = test::deterministic_config(seed, script.string());
     return CampaignOnBench::run();
   }
-  /// Why the motor, which turned, was let go.
+  /// Why the turning motor was stopped.
   std::string stop(const std::string& faults) {
     const std::string why = test::words_of<SafetyStop>([&] { return run(faults); });
     EXPECT_NE(why, "") << "went unnoticed: " << faults;

@@ -84,7 +84,7 @@ TEST_F(FaultyCampaign, FlagsAllStepsAfterARestartOfTheBoxUntilTheNextRun) {
   EXPECT_EQ(run("  - {at_s: 1.6, kind: reboot, down_s: 0.1, resume: true}\n").runs, 2);
   EXPECT_THAT(flags(0),
               ElementsAre("zero_drifted", HasSubstr("rebooted"), "rebooted+zero_drifted", "rebooted+zero_drifted"))
-      << "of this power-up there is no zero after the run";
+      << "since the box restarted, no zero was taken after a run";
   EXPECT_EQ(flags(1), kNoFlags);
   EXPECT_EQ(recording(0).account.reboots, 1u);
   EXPECT_EQ(said_.count("the box has booted"), 1);

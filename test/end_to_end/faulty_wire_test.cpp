@@ -67,7 +67,7 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
   EXPECT_EQ(lost, 0u) << "kphi info tells it";
   EXPECT_GT(duplicates, 0u);
   EXPECT_GT(malformed, 0u);
-  // What went wrong before a run's first record and after its last is no part of it.
+  // What goes wrong before a run's first record or after its last does not belong to the run.
   EXPECT_LE(duplicates, totals->at("totals").at("records_duplicated").get<std::uint64_t>());
   EXPECT_LE(malformed, totals->at("totals").at("malformed").get<std::uint64_t>());
 }

@@ -142,7 +142,8 @@ TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndKeepsIt) {
   EXPECT_THAT(person_.questions[0].reason, HasSubstr("repetition 2"));
   EXPECT_EQ(person_.mounted_deg.size(), 1u);
   EXPECT_EQ(steps().size(), 16u) << "it stays on record";
-  EXPECT_TRUE(std::isnan(means().at(0).repetitions_left_out)) << "being far from the others is no cause";
+  EXPECT_TRUE(std::isnan(means().at(0).repetitions_left_out))
+      << "a repetition is not left out just because it is far from the others";
   const auto judged = journaled("repetitions_judged");
   ASSERT_EQ(judged.size(), 2u);
   EXPECT_EQ(judged[1].at("repetitions").at(1).at("outlying"), true);

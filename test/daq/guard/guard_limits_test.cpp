@@ -73,7 +73,7 @@ TEST_F(CombinedLimits, AreThoseOfTheCampaignWhenNobodySaysLess) {
 
 TEST_F(CombinedLimits, HaveNoRowForWhatNobodyLimits) {
   for (const Watched watched : {Watched::shaft_torque, Watched::force_z, Watched::supply_voltage_high,
-                                Watched::supply_age, Watched::output_current})  // there is no supply
+                                Watched::supply_age, Watched::output_current})  // this bench has no supply
     EXPECT_FALSE(row(watched)) << static_cast<int>(watched);
 }
 

@@ -72,7 +72,7 @@ TEST_F(StatusWatching, ReadsTheBitsOfItsProduct) {
   EXPECT_TRUE(events_.empty()) << "which the ranges tell";
   EXPECT_EQ(take(0xC0000000, 41), State::untrusted) << "a Net Box's CPU or RAM";
   StatusWatch other{Product::axia, 40, 7000};
-  EXPECT_EQ(take(other, 0x80020000, 41), State::untrusted) << "a Net Box's saturation is no bit of an Axia";
+  EXPECT_EQ(take(other, 0x80020000, 41), State::untrusted) << "an Axia does not have the Net Box's bit for saturation";
   EXPECT_THAT(other.reason(), HasSubstr("the Axia reports \"bit 17\" (status 0x80020000)"));
 }
 

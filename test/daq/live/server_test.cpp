@@ -176,7 +176,7 @@ TEST_F(LiveServer, RefusesAWrongOrMissingTokenAndForeignOriginsAndHosts) {
     EXPECT_EQ(refusal_of(token, host, origin), "HTTP/1.1 403 Forbidden") << host << " " << origin;
   EXPECT_EQ(server_->clients(), 0u);
   EXPECT_FALSE(Onlooker(server_->port(), kLive, here(), "http://evil.example").is_in());
-  EXPECT_TRUE(Onlooker(server_->port(), kLive, here(), "").is_in()) << "a program that is no browser";
+  EXPECT_TRUE(Onlooker(server_->port(), kLive, here(), "").is_in()) << "a program, which sends no Origin";
 }
 
 TEST_F(LiveServer, RefusesWhatIsNoPlainGet) {

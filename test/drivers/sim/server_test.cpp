@@ -311,7 +311,7 @@ TEST_F(FaultyServer, AnAddressOfNobodyIsSilenceNotAnEnd) {
   EXPECT_EQ(receive(socket).size(), 36u) << "back where it was";
 }
 
-/// The answer as far as it has come, 5 s at most, without a pause of 200 ms.
+/// What has come of the answer until 200 ms pass without a byte, or 5 s in all.
 std::string ask_port(const Descriptor& port, std::string_view spelt, std::size_t size) {
   give_hex(port, spelt);
   std::string answer;
