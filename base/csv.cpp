@@ -55,7 +55,7 @@ std::optional<std::vector<std::string>> split_blanks(std::string_view line) {
 }
 
 /// A row with the header's number of fields, a trailing empty one taken off; otherwise the problem goes into the table.
-void take_row(Table& table, std::size_t number, std::optional<std::vector<std::string>> fields) {
+void take_row(Table& table, std::size_t number, std::optional<std::vector<std::string>> fields, const TakeRow& take) {
   if (!fields) {
     table.problems.push_back({number, "a quoted field is not closed; line skipped"});
     return;
@@ -66,11 +66,12 @@ void take_row(Table& table, std::size_t number, std::optional<std::vector<std::s
         {number, fmt::format("{} fields where the header has {}; line skipped", fields->size(), table.header.size())});
     return;
   }
+  if (take) return take(table, {number, std::move(*fields)});
   table.rows.push_back({number, std::move(*fields)});
 }
 
 template <class Split>
-Table read_table(std::string_view text, std::string path, const Split& split) {
+Table read_table(std::string_view text, std::string path, const Split& split, const TakeRow& take = {}) {
   Table table;
   table.path = std::move(path);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
@@ -79,7 +80,7 @@ Table read_table(std::string_view text, std::string path, const Split& split) {
     if (trimmed(line).empty()) continue;
     auto fields = split(line);
     if (table.header_line != 0) {
-      take_row(table, number, std::move(fields));
+      take_row(table, number, std::move(fields), take);
       continue;
     }
     table.header_line = number;
@@ -118,6 +119,7 @@ std::size_t Table::column(std::string_view name) const {
 
 std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator) {
   std::vector<std::string> fields;
+  fields.reserve(static_cast<std::size_t>(std::ranges::count(line, separator)) + 1);
   for (;;) {
     if (!line.empty() && line.front() == '"') {
       auto field = take_quoted(line);
@@ -133,10 +135,10 @@ std::optional<std::vector<std::string>> split_csv_line(std::string_view line, ch
   }
 }
 
-Table read_csv(std::string_view text, std::string path, char separator) {
+Table read_csv(std::string_view text, std::string path, char separator, const TakeRow& take) {
   if (separator == 0) separator = likely_separator(text);
-  return read_table(text, std::move(path),
-                    [separator](std::string_view line) { return split_csv_line(line, separator); });
+  return read_table(
+      text, std::move(path), [separator](std::string_view line) { return split_csv_line(line, separator); }, take);
 }
 
 Table read_blank_separated(std::string_view text, std::string path) {

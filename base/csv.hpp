@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,7 +35,9 @@ struct Table {
 
 /// A byte order mark, CRLF and a trailing empty field on each line are accepted; a field may be in double quotes, a
 /// quote in it doubled. Empty lines are skipped. Separator 0: the one of , ; tab that the header line has most of.
-[[nodiscard]] Table read_csv(std::string_view text, std::string path, char separator = ',');
+/// With `take` each row is handed over, with the table so far, and not kept.
+using TakeRow = std::function<void(const Table&, const TableRow&)>;
+[[nodiscard]] Table read_csv(std::string_view text, std::string path, char separator = ',', const TakeRow& take = {});
 
 /// The fields of one line of such a table; nullopt if its quotes do not close, or text follows a closing quote.
 [[nodiscard]] std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator = ',');

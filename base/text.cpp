@@ -28,7 +28,8 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t most_b
   if (!S_ISREG(about.st_mode)) throw std::runtime_error("is a pipe or a device; name a file");
   std::string text;
   for (std::size_t size = 0;;) {
-    text.resize(std::min(most_bytes + 1, std::max<std::size_t>(2 * size, 1 << 16)));
+    if (size == text.size())
+      text.resize(std::min(most_bytes + 1, std::max(2 * size, static_cast<std::size_t>(about.st_size) + 1)));
     const ssize_t got = ::read(file.number(), text.data() + size, text.size() - size);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) fail("cannot be read", "check the disk");

@@ -189,9 +189,8 @@ ExitCode devices(const DevicesRequest& asked) {
   for (DeviceAnswer& answer : ask_usb(answers)) answers.push_back(std::move(answer));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file, so only the Net Box's factory address was tried; use --bench\n");
-  for (const DeviceAnswer& answer : answers) {
+  for (const DeviceAnswer& answer : answers)
     if (answer.wanted && !answer.answers) return ExitCode::no_device;
-  }
   return ExitCode::ok;
 }
 

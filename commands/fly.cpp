@@ -184,9 +184,8 @@ Json json_of(const Experiment& experiment, const FlightResult& flight) {
 void print_flights(const FlyRequest& request, const Flown& flown) {
   const Truth& truth = flown.nominal.truth;
   Json flights = Json::array();
-  for (std::size_t i = 0; i < flown.flights.size(); ++i) {
+  for (std::size_t i = 0; i < flown.flights.size(); ++i)
     if (flown.flights[i].leg_count > 0) flights.push_back(json_of(kExperiments[i], flown.flights[i]));
-  }
   Json out{{"coefficients", request.coefficients}, {"vehicle", request.vehicle}, {"seed", request.seed},
            {"loss_law", name_of(truth.law)},       {"gamma", truth.gamma},       {"flights", flights}};
   if (!flown.draws.empty()) out["study"] = json_of(findings_of(flown.draws));

@@ -159,9 +159,8 @@ ExitCode print_plan(const RunRequest& request) {
 void announce(const RunRequest& request, const DryRun& dry) {
   put(stderr, plan_text(request.campaign, request.config, dry.plan) +
                   "\nCtrl-C coasts the motor, closes the file and stops.\n");
-  for (const PlanCheck& check : dry.checks) {
+  for (const PlanCheck& check : dry.checks)
     if (check.finding.severity != Severity::note) put(stderr, check.subject + ": " + check.finding.line() + "\n");
-  }
 }
 
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.

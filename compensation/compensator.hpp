@@ -27,7 +27,7 @@ enum class Flag : std::uint8_t {
   speed_at_slowest = 4,    ///< raised to the slowest speed
   speed_at_fastest = 8,    ///< cut to the fastest speed: the thrust will be missed
   arm_angle_unknown = 16,  ///< the last arm angle was not finite: the occlusion before it is kept
-  beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the curve is extrapolated
+  beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the curve is a guess there
   at_floor = 64,           ///< k_i is at kScalingFloor or (published law) below
   at_ceiling = 128,        ///< covered, yet the curve lies above K_T there: k_i is held at 1 (clamped law)
 };

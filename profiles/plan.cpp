@@ -62,9 +62,8 @@ void number_and_mount(std::vector<PlannedRun>& runs, const Campaign& campaign) {
 
 std::vector<double> Plan::mounting_angles() const {
   std::vector<double> angles_deg;
-  for (const PlannedRun& run : runs) {
+  for (const PlannedRun& run : runs)
     if (run.mount) angles_deg.push_back(run.occlusion_deg);
-  }
   return angles_deg;
 }
 

@@ -227,23 +227,25 @@ std::string format_steps(std::span<const StepMean> steps) {
 }
 
 std::vector<StepMean> parse_steps(std::string_view text, const std::string& name) {
-  const Table table = read_csv(text, name);
-  const auto refuse = [&](std::size_t line, const std::string& what) {
-    throw ConfigurationError(fmt::format("{}:{}: {}", name, line, what));
-  };
-  // The reader of tables goes on without such a line; here it is a fault.
-  for (const TableProblem& problem : table.problems)
-    refuse(problem.line, problem.what.substr(0, problem.what.find(';')));
   std::size_t line = 1;
   std::vector<StepMean> steps;
-  try {
-    const Columns columns = columns_named(table.header);
-    for (const TableRow& row : table.rows) {
-      line = row.line;
-      steps.push_back(step_from(row.fields, columns));
+  std::optional<Columns> columns;
+  const auto follow = [&](const Table& table) {
+    // The reader of tables goes on without such a line; here it is a fault.
+    for (const TableProblem& problem : table.problems) {
+      line = problem.line;
+      throw std::invalid_argument(problem.what.substr(0, problem.what.find(';')));
     }
+    if (!columns) columns = columns_named(table.header);
+  };
+  try {
+    follow(read_csv(text, name, ',', [&](const Table& table, const TableRow& row) {
+      follow(table);
+      line = row.line;
+      steps.push_back(step_from(row.fields, *columns));
+    }));
   } catch (const std::invalid_argument& error) {
-    refuse(line, error.what());
+    throw ConfigurationError(fmt::format("{}:{}: {}", name, line, error.what()));
   }
   return steps;
 }

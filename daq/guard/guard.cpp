@@ -33,10 +33,8 @@ void discard(Link& link) {
 }
 
 double speed_share(const std::vector<GuardLimit>& limits) {
-  for (const GuardLimit& limit : limits) {
-    if (limit.watched == Watched::speed_error) return limit.value / 100;
-  }
-  return SpeedWatch::kShare;
+  const auto limit = std::ranges::find(limits, Watched::speed_error, &GuardLimit::watched);
+  return limit != limits.end() ? limit->value / 100 : SpeedWatch::kShare;
 }
 
 }  // namespace
@@ -156,7 +154,7 @@ void Guard::judge(const MotorReading& reading) {
 void Guard::judge(const SupplyReading& reading) {
   supply_stream_.newest = Instant(reading.time_ns);
   if (!supply_) return;
-  if (auto trouble = daq::check(reading, *supply_, reading.time_ns >= settled_from_)) trip(std::move(*trouble));
+  if (auto trouble = daq::check(reading, *supply_, observer_.is_settled(reading.time_ns))) trip(std::move(*trouble));
   observer_.take(reading);
 }
 

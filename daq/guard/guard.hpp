@@ -56,7 +56,7 @@ class Guard final {
   /// Mean of each axis without load, N and N m. Thrust and torque are judged from then on.
   void take_zero(const std::array<double, 6>& mean) noexcept { observer_.take_zero(mean); }
   /// Until then sag, rise and current limit of the supply are excused: the speed is changing.
-  void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
+  void settles_until(Instant when) noexcept { observer_.settles_until(when); }
   /// Heartbeat of the run thread; to be called before every order that turns the motor. Throws SafetyStop after a trip,
   /// if the guard has stalled, or if runner or computer were away for so long that the module may have coasted the
   /// motor.
@@ -115,7 +115,7 @@ class Guard final {
   Published<Readings> shown_;
   std::atomic<bool> judging_{true}, spinning_{false};
   std::atomic<int> step_{-1};
-  std::atomic<std::int64_t> polled_ns_, beat_ns_, settled_from_{0};
+  std::atomic<std::int64_t> polled_ns_, beat_ns_;
   std::atomic<double> pause_s_{kUnknown};  ///< between the last two heartbeats while the motor turns
 };
 

@@ -117,6 +117,9 @@ class Observer {
   void take(const results::PhaseMark& mark) noexcept;
   /// Fx Fy Fz in N, Tx Ty Tz in N m. Thrust and torque are judged from then on. Any thread.
   void take_zero(const std::array<double, 6>& mean) noexcept;
+  /// Until then the speed is changing, and what a change brings is excused. Any thread.
+  void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
+  [[nodiscard]] bool is_settled(Nanoseconds at) const noexcept { return at >= settled_from_; }
 
   /// The newest readings; of each guarded quantity the value closest to its limit since the last call.
   [[nodiscard]] Readings readings() noexcept;
@@ -134,6 +137,7 @@ class Observer {
   std::array<bool, kWatchedCount> told_{};  ///< updated since readings() was called
   std::atomic<bool> has_zero_{false};
   std::atomic<double> thrust_zero_{0}, torque_zero_{0};
+  std::atomic<std::int64_t> settled_from_{0};
 };
 
 }  // namespace kphi::daq

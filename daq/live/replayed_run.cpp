@@ -104,6 +104,8 @@ void ReplayedRun::report_phases(Instant when, Progress& progress) {
     if (position_.step >= 0) progress.step_done(position_, seen_);
     const auto& mark = recording_.phases[phase_];
     observer_.take(mark);
+    observer_.settles_until(
+        mark.phase == Phase::ramp ? kNever : Instant(mark.time_ns) + from_seconds(recording_.header.minimum_discard_s));
     position_.step = mark.step;
     position_.phase = kPhaseWords[static_cast<std::size_t>(mark.phase)];
     position_.commanded = RadPerSec(mark.speed_rad_s);

@@ -103,10 +103,8 @@ struct Console::Shared {
     return std::ranges::all_of(streams, [](const Stream& stream) { return stream.queue.empty(); });
   }
   [[nodiscard]] Stream& stream(int name) {
-    for (Stream& known : streams) {
-      if (known.name == name) return known;
-    }
-    return streams.emplace_back(name);
+    const auto known = std::ranges::find(streams, name, &Stream::name);
+    return known != streams.end() ? *known : streams.emplace_back(name);
   }
   /// The bell, and each stream with waiting texts. False: the thread must end.
   [[nodiscard]] bool list(std::vector<pollfd>& waiting) {

@@ -276,7 +276,7 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   Export result;
   result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text;
   result.lost = {"hashes of the runs: only in the coefficient file",
-                 "the covariance's shape: parameters have no matrices; it is row by row of (intercept, slope per rad)"};
+                 "the covariance's shape: parameters have no matrices; it is row by row, in the order of the parameters"};
   if (!parameters.unknown.empty())
     result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown);
   return result;

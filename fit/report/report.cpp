@@ -374,8 +374,8 @@ std::string provenance_section(const Identification& identification, const Prove
 
 std::string family_section(std::span<const Fitted> family) {
   HtmlTable table({text("propeller"), "diameter, in", "blades", "K<sub>T</sub>, N/(rad/s)²",
-                   "K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)", "slope, N/(rad/s)² per degree",
-                   "slope, % of K<sub>T</sub> per degree"});
+                   "K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)", "slope of a line, N/(rad/s)² per degree",
+                   "slope of a line, % of K<sub>T</sub> per degree"});
   for (const Fitted& fitted : family) {
     const Identification& one = fitted.identification;
     const Budget& K_T = fitted.analysis.coefficients.front();

@@ -95,9 +95,8 @@ void collect(const Transition& step, Collected& all) {
 
 std::optional<Dynamics> identify_dynamics(std::span<const results::RunRecording> runs) {
   std::vector<Transition> transitions;
-  for (const results::RunRecording& run : runs) {
+  for (const results::RunRecording& run : runs)
     for (Transition& step : results::transitions_of(run)) transitions.push_back(std::move(step));
-  }
   Collected all;
   for (const Transition& step : transitions) collect(step, all);
   if (all.steps < 3 || all.readings.size() < 10) return std::nullopt;

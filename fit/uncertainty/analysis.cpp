@@ -30,6 +30,10 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
   return error_sources(std::move(k), std::move(errors));
 }
 
+bool has_errors(const CurveFit& curve) {
+  return std::ranges::all_of(curve.points, [](const CurvePoint& point) { return point.standard_error > 0; });
+}
+
 /// Deviation from the curve beyond the errors of its points, once a test has rejected its form. Of points without
 /// errors the whole deviation, which is all that is known of them.
 BudgetRow curve_row(const CurveFit& curve, const Curvature& curvature) {
@@ -38,7 +42,7 @@ BudgetRow curve_row(const CurveFit& curve, const Curvature& curvature) {
                 .sensitivity = 1,
                 .note = "deviation of its points beyond their errors, where a test finds it"};
   const double n = static_cast<double>(curve.points.size()), spare = curve.spare_points();
-  if (!std::ranges::all_of(curve.points, [](const CurvePoint& point) { return point.standard_error > 0; })) {
+  if (!has_errors(curve)) {
     const double squares =
         std::inner_product(curve.residuals.begin(), curve.residuals.end(), curve.residuals.begin(), 0.0);
     row.u = spare > 0 ? std::sqrt(squares / spare) : std::numeric_limits<double>::quiet_NaN();
@@ -59,7 +63,8 @@ BudgetRow curve_row(const CurveFit& curve, const Curvature& curvature) {
 struct Misfit {
   Misfit(const CurveFit& curve, const Curvature& curvature, std::span<const OcclusionCoefficient> table)
       : row(curve_row(curve, curvature)) {
-    for (const OcclusionCoefficient& one : table) may_miss.push_back(curve.model().may_miss(curve, one.phi_deg));
+    for (const OcclusionCoefficient& one : table)
+      may_miss.push_back(!has_errors(curve) || curve.model().may_miss(curve, one.phi_deg));
   }
 
   BudgetRow row;  ///< of one point

@@ -80,9 +80,8 @@ CellWindow CellBins::over(std::size_t first, std::size_t last) const {
 
 CellStream::CellStream(const RunRecording& run, const LoadCellColumns& cell)
     : header_(run.header), cell_(cell), clock_(cell_, run.header.load_cell.device_rate_hz, run.events) {
-  for (const ClockEpoch& epoch : clock_.epochs()) {
+  for (const ClockEpoch& epoch : clock_.epochs())
     if (epoch.rebooted) reboots_.push_back(clock_.time_ns(epoch, epoch.begin));
-  }
 }
 
 std::size_t CellStream::boot_at(Nanoseconds time) const {

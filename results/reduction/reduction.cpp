@@ -224,9 +224,8 @@ class Reduction {
     const CellWindow& cell = evidence.cell;
     const ZeroThen zero = zeros_.at(evidence.window.centre(), cell_.boot_at(evidence.window.end));
     std::vector<double> thrust;
-    for (std::size_t i = first; i < step.transition.thrust.size(); ++i) {
+    for (std::size_t i = first; i < step.transition.thrust.size(); ++i)
       if (!std::isnan(step.transition.thrust[i])) thrust.push_back(step.transition.thrust[i]);
-    }
     const MeanError error = mean_error(thrust);
     mean.thrust_n = newtons_ * (cell.force.mean - zero.force);
     mean.thrust_sd_n = std::abs(newtons_) * cell.force.deviation;

@@ -306,10 +306,8 @@ std::map<double, Pair> pairs_of(std::span<const StepMean> run) {
 
 /// Of the air during a run, kg/m³; NaN: unknown.
 double density_of(std::span<const StepMean> steps, int repetition) {
-  for (const StepMean& step : steps) {
-    if (step.repetition == repetition) return step.air_density_kg_m3;
-  }
-  return kNotMeasured;
+  const auto step = std::ranges::find(steps, repetition, &StepMean::repetition);
+  return step != steps.end() ? step->air_density_kg_m3 : kNotMeasured;
 }
 
 }  // namespace

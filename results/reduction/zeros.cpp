@@ -13,9 +13,8 @@ constexpr double kStandstill = 5.0;  // rad/s
 /// The time after the last reading of a turning motor.
 Nanoseconds standstill_in(const MotorSeries& motor, const Window& window) {
   Nanoseconds time = window.begin;
-  for (const auto& reading : motor.over(MotorChannel::speed, window)) {
+  for (const auto& reading : motor.over(MotorChannel::speed, window))
     if (std::abs(reading.value) > kStandstill) time = reading.time_ns + 1;
-  }
   return time;
 }
 

@@ -114,9 +114,8 @@ const std::vector<SupplyModel>& supply_models() {
 SupplyRegisters::SupplyRegisters(const std::string& model, std::uint32_t serial, bool over_current_in_milliamps,
                                  SupplyCircuit& circuit)
     : model_(nullptr), serial_(serial), over_current_in_milliamps_(over_current_in_milliamps), circuit_(circuit) {
-  for (const SupplyModel& known : supply_models()) {
+  for (const SupplyModel& known : supply_models())
     if (known.name == model) model_ = &known;
-  }
   if (model_ == nullptr) throw std::invalid_argument("the simulator has no supply model \"" + model + "\"");
   circuit_.controls().over_volts = model_->volts_max * 1.03;
 }
