@@ -167,7 +167,8 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
 std::string plus_minus_words(const Budget& budget) {
   const std::vector<std::string> missing = budget.not_known();
   if (!(budget.combined() > 0))
-    return "no u of k was given: that of each k is unknown; ± of the curve, if any, is 95 % by the scatter of its points";
+    return "no u of k was given: that of each k is unknown; ± of the curve, if any, is 95 % by the scatter of its "
+           "points";
   if (missing.empty()) return "± is 95 % by the GUM";
   return fmt::format("± is 95 % by the GUM; unknown and not in it: {} (see --u)", fmt::join(missing, ", "));
 }

@@ -26,6 +26,9 @@ namespace kphi::fit {
 /// "45°"
 [[nodiscard]] std::string html_angle(double phi_deg);
 
+/// Of a speed in rad/s, whole RPM: "19100"
+[[nodiscard]] std::string html_rpm(double speed_rad_s);
+
 /// A heading of level 2.
 [[nodiscard]] std::string html_heading(std::string_view title);
 
@@ -42,6 +45,8 @@ class HtmlTable {
     std::string html;
     Column column = Column::number;
   };
+  /// Heading of a column of text.
+  static Heading text(const char* html) { return {html, Column::text}; }
   /// A long table may break across pages.
   explicit HtmlTable(std::vector<Heading> headings, bool is_long = false);
   /// As many cells as headings. `bad` names the column whose cell is marked as a failure.
@@ -54,6 +59,9 @@ class HtmlTable {
   std::string html_;
   bool has_rows_ = false;
 };
+
+/// A table under its heading, with a note below; empty if the table is.
+[[nodiscard]] std::string html_section(std::string_view title, const HtmlTable& table, std::string_view note = {});
 
 /// An SVG file as an element of a page: without XML declaration and doctype, with `prefix` before every id and every
 /// reference to one, so that two figures on a page do not mix. Empty if the text is not SVG.

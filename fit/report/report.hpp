@@ -6,16 +6,10 @@
 #include <string>
 
 #include "fit/coefficients/coefficients.hpp"
-#include "fit/propellers/claims.hpp"
 #include "fit/report/gnuplot.hpp"
 #include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
-
-/// Tables of the page, each with its heading; empty if the data have none. Rejected points, budget, predictions, k
-/// against speed, tests, torque; and the paper's statements about several propellers.
-[[nodiscard]] std::string analysis_sections(const Analysis& analysis);
-[[nodiscard]] std::string claims_section(std::span<const Claim> claims);
 
 /// What the page shows of one campaign beside the numbers.
 struct Chapter {

@@ -14,6 +14,8 @@
 #include <string>
 
 #include "base/number.hpp"
+#include "fit/report/analysis_sections.hpp"
+#include "fit/report/family_sections.hpp"
 #include "fit/report/figures.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "fit/report/gnuplot.hpp"

@@ -1,0 +1,63 @@
+#include "fit/report/family_sections.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "fit/propellers/family.hpp"
+#include "fit/report/html.hpp"
+
+namespace kphi::fit {
+namespace {
+
+std::string interval(double lower, double upper) {
+  if (!std::isfinite(lower) && !std::isfinite(upper)) return "–";
+  return html_number(lower, "{:.4g}") + " to " + html_number(upper, "{:.4g}");
+}
+
+}  // namespace
+
+std::string family_section(std::span<const Fitted> family) {
+  HtmlTable table({HtmlTable::text("propeller"), "diameter, in", "blades", "K<sub>T</sub>, N/(rad/s)²",
+                   "K<sub>T</sub>/D⁴, N/((rad/s)² m⁴)", "slope of a line, N/(rad/s)² per degree",
+                   "slope of a line, % of K<sub>T</sub> per degree"});
+  for (const Fitted& fitted : family) {
+    const Identification& one = fitted.identification;
+    const Budget& K_T = fitted.analysis.coefficients.front();
+    const Budget& slope = fitted.analysis.line.slope;
+    const double diameter_m = 0.0254 * one.diameter_in;
+    table.row({html_escaped(one.propeller), one.diameter_in > 0 ? fmt::format("{:g}", one.diameter_in) : "–",
+               one.blades > 0 ? fmt::format("{}", one.blades) : "–", with_power_of_ten(K_T.value, K_T.expanded()),
+               diameter_m > 0 ? fmt::format("{:.5f}", K_T.value / std::pow(diameter_m, 4)) : "–",
+               with_power_of_ten(slope.value, slope.expanded()),
+               html_number(100 * slope.value / K_T.value, "{:+.4f}")});
+  }
+  return html_section("The propellers side by side", table,
+                      "± is 95 % by the GUM; what each lacks stands in its chapter.");
+}
+
+std::string slopes_section(std::span<const SharedSlope> slopes) {
+  HtmlTable table(
+      {"diameter, in", HtmlTable::text("propellers"), "slope, N/(rad/s)² per degree", "95 %, ±", "equal slopes, p"});
+  for (const SharedSlope& one : slopes)
+    table.row({fmt::format("{:g}", one.diameter_in), html_escaped(fmt::format("{}", fmt::join(one.propellers, ", "))),
+               with_power_of_ten(one.slope.value, std::hypot(one.slope.u, one.common_u)),
+               fmt::format("{:.1e}", one.expanded()), fmt::format("{:.4f}", one.equal_slopes.p)});
+  return html_section(
+      "One slope for each diameter", table,
+      "± comes from the scatter of runs and steps, the zero, and the errors that all share. The line of a "
+      "single propeller never takes a point as known better than 0.1 % of K<sub>T</sub>.");
+}
+
+std::string claims_section(std::span<const Claim> claims) {
+  HtmlTable table(
+      {HtmlTable::text("statement"), "found", "95 %", "allowed", HtmlTable::text("unit"), HtmlTable::text("verdict")});
+  for (const Claim& claim : claims)
+    table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
+               interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit), name_of(claim.verdict)},
+              claim.verdict == Verdict::fails ? std::optional<std::size_t>(5) : std::nullopt);
+  return html_section("The paper's statements", table);
+}
+
+}  // namespace kphi::fit
