@@ -70,8 +70,7 @@ void take_row(Table& table, std::size_t number, std::optional<std::vector<std::s
   table.rows.push_back({number, std::move(*fields)});
 }
 
-template <class Split>
-Table read_table(std::string_view text, std::string path, const Split& split, const TakeRow& take = {}) {
+Table read_table(std::string_view text, std::string path, const auto& split, const TakeRow& take = {}) {
   Table table;
   table.path = std::move(path);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());

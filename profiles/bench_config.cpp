@@ -37,13 +37,10 @@ NetBoxConfig read_netbox(ProfileReader& file) {
 }
 
 ClockGain read_clock_gain(const ProfileReader& file) {
-  ClockGain gain;
-  gain.factor = file.number("/iq/clock_gain/factor");
-  gain.u_factor = file.number("/iq/clock_gain/u");
-  gain.uid = file.get_or("/iq/clock_gain/uid", gain.uid);
-  gain.measured_utc = file.get_or("/iq/clock_gain/measured_utc", gain.measured_utc);
   static_cast<void>(file.find<double>("/iq/clock_gain/duration_s"));  // for people only
-  return gain;
+  return {file.number("/iq/clock_gain/factor"), file.number("/iq/clock_gain/u"),
+          file.get_or<std::string>("/iq/clock_gain/uid", ""),
+          file.get_or<std::string>("/iq/clock_gain/measured_utc", "")};
 }
 
 MotorConfig read_motor(const ProfileReader& file, const std::filesystem::path& folder) {

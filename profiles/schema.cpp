@@ -7,6 +7,7 @@
 #include <regex>
 #include <set>
 #include <string_view>
+#include <utility>
 
 namespace kphi::profiles {
 namespace {
@@ -56,24 +57,17 @@ KeyParts split_unit(const std::string& key) {
 }
 
 std::optional<std::string> nearest_name(const std::string& name, const std::vector<std::string>& names) {
-  std::optional<std::string> nearest;
-  std::size_t fewest = std::max<std::size_t>(1, std::min<std::size_t>(3, name.size() / 3)) + 1;
-  for (const std::string& candidate : names) {
-    const std::size_t distance = slips(name, candidate);
-    if (distance < fewest) {
-      fewest = distance;
-      nearest = candidate;
-    }
-  }
-  return nearest;
+  const auto distance = [&](const std::string& candidate) { return slips(name, candidate); };
+  const auto nearest = std::ranges::min_element(names, {}, distance);
+  const std::size_t most = std::clamp<std::size_t>(name.size() / 3, 1, 3);
+  return nearest != names.end() && distance(*nearest) <= most ? std::optional(*nearest) : std::nullopt;
 }
 
 std::optional<std::string> same_but_for_unit(const std::string& name, const std::vector<std::string>& names) {
   const std::string stem = split_unit(name).stem;
-  for (const std::string& candidate : names) {
-    if (candidate != name && split_unit(candidate).stem == stem) return candidate;
-  }
-  return std::nullopt;
+  const auto same = std::ranges::find_if(
+      names, [&](const std::string& candidate) { return candidate != name && split_unit(candidate).stem == stem; });
+  return same != names.end() ? std::optional(*same) : std::nullopt;
 }
 
 namespace {
@@ -190,20 +184,14 @@ std::string allowed_range(const Spot& s) {
                      bound("maximum", "exclusiveMaximum", "below "), s.unit());
 }
 
-template <class Within>
-void check_bound(const Spot& s, const json& bound, std::string_view relation, Findings& findings) {
-  if (!s.value.is_number() || Within{}(s.value.get<double>(), bound.get<double>())) return;
-  findings.push_back(
-      s.at_value(fmt::format("{} is {} {}{}", s.value.dump(), relation, bound.dump(), s.unit()), allowed_range(s)));
+/// `relation` is what the value is to the bound where it is not within.
+auto bound_by(auto within, const char* relation) {
+  return [=](const Spot& s, const json& bound, Findings& findings) {
+    if (!s.value.is_number() || within(s.value.get<double>(), bound.get<double>())) return;
+    findings.push_back(
+        s.at_value(fmt::format("{} is {} {}{}", s.value.dump(), relation, bound.dump(), s.unit()), allowed_range(s)));
+  };
 }
-void check_maximum(const Spot& s, const json& most, Findings& f) {
-  check_bound<std::less_equal<>>(s, most, "above", f);
-}
-void check_below(const Spot& s, const json& end, Findings& f) { check_bound<std::less<>>(s, end, "not below", f); }
-void check_minimum(const Spot& s, const json& least, Findings& f) {
-  check_bound<std::greater_equal<>>(s, least, "below", f);
-}
-void check_above(const Spot& s, const json& end, Findings& f) { check_bound<std::greater<>>(s, end, "not above", f); }
 
 std::size_t characters(const json& text) {
   const auto& bytes = text.get_ref<const std::string&>();
@@ -221,18 +209,14 @@ void check_shortest(const Spot& s, const json& least, Findings& findings) {
                                 "write " + s.purpose("what it is")));
 }
 
-void refuse_number(const Spot& s, std::string_view noun, const std::string& next_move, Findings& findings) {
-  const std::string found = noun == "keys" && s.value.empty() ? "no keys" : fmt::format("{} {}", s.value.size(), noun);
-  findings.push_back(s.at_value(found, "write at " + next_move));
-}
-void check_most_items(const Spot& s, const json& most, Findings& f) {
-  if (s.value.is_array() && s.value.size() > most) refuse_number(s, "values", "most " + most.dump(), f);
-}
-void check_fewest_items(const Spot& s, const json& least, Findings& f) {
-  if (s.value.is_array() && s.value.size() < least) refuse_number(s, "values", "least " + least.dump(), f);
-}
-void check_fewest_keys(const Spot& s, const json& least, Findings& f) {
-  if (s.value.is_object() && s.value.size() < least) refuse_number(s, "keys", "least " + least.dump(), f);
+/// Of the items of a list, or the keys of an object.
+auto number_by(auto within, bool (json::*concerns)() const noexcept, const char* noun, const char* limit) {
+  return [=](const Spot& s, const json& bound, Findings& findings) {
+    if (!(s.value.*concerns)() || within(s.value.size(), bound)) return;
+    const bool no_keys = s.value.is_object() && s.value.empty();
+    findings.push_back(s.at_value(no_keys ? "no keys" : fmt::format("{} {}", s.value.size(), noun),
+                                  fmt::format("write at {} {}", limit, bound.dump())));
+  };
 }
 
 /// Dotted names of the objects, other than the one at hand, that know `key`.
@@ -287,12 +271,10 @@ void check_required(const Spot& s, const json& required, Findings& findings) {
   if (!s.value.is_object()) return;
   const std::vector<std::string> known = known_keys(s.schema);
   const auto meant_elsewhere = [&](const std::string& key) {
-    for (const std::string& present : keys_of(s.value)) {
-      if (std::ranges::count(known, present) > 0) continue;
+    return std::ranges::any_of(keys_of(s.value), [&](const std::string& present) {
       const auto by_unit = same_but_for_unit(present, known);
-      if ((by_unit ? by_unit : nearest_name(present, known)) == key) return true;
-    }
-    return false;
+      return std::ranges::count(known, present) == 0 && (by_unit ? by_unit : nearest_name(present, known)) == key;
+    });
   };
   for (const json& name : required) {
     const std::string key = name;
@@ -311,33 +293,30 @@ void check_items(const Spot& s, const json& schema, Findings& findings) {
     check({s.document, s.whole_schema, schema, s.value[i], fmt::format("{}/{}", s.pointer, i)}, findings);
 }
 
-struct Keyword {
-  std::string_view name;
-  void (*check)(const Spot&, const json& argument, Findings&);
-};
-
-/// What a schema may say beside annotations. The type first: of the findings at one value the first is shown.
-constexpr Keyword kKeywords[] = {{"type", check_type},
-                                 {"enum", check_enum},
-                                 {"pattern", check_pattern},
-                                 {"maximum", check_maximum},
-                                 {"exclusiveMaximum", check_below},
-                                 {"minimum", check_minimum},
-                                 {"exclusiveMinimum", check_above},
-                                 {"maxLength", check_longest},
-                                 {"minLength", check_shortest},
-                                 {"maxItems", check_most_items},
-                                 {"minItems", check_fewest_items},
-                                 {"minProperties", check_fewest_keys},
-                                 {"properties", check_properties},
-                                 {"additionalProperties", check_other_keys},
-                                 {"required", check_required},
-                                 {"items", check_items}};
+using Check = std::function<void(const Spot&, const json& argument, Findings&)>;
 
 void check(const Spot& spot, Findings& findings) {
-  for (const Keyword& keyword : kKeywords) {
-    const auto argument = spot.schema.find(keyword.name);
-    if (argument != spot.schema.end()) keyword.check(spot, *argument, findings);
+  // What a schema may say beside annotations. The type first: of the findings at one value the first is shown.
+  static const std::pair<const char*, Check> kKeywords[] = {
+      {"type", check_type},
+      {"enum", check_enum},
+      {"pattern", check_pattern},
+      {"maximum", bound_by(std::less_equal(), "above")},
+      {"exclusiveMaximum", bound_by(std::less(), "not below")},
+      {"minimum", bound_by(std::greater_equal(), "below")},
+      {"exclusiveMinimum", bound_by(std::greater(), "not above")},
+      {"maxLength", check_longest},
+      {"minLength", check_shortest},
+      {"maxItems", number_by(std::less_equal(), &json::is_array, "values", "most")},
+      {"minItems", number_by(std::greater_equal(), &json::is_array, "values", "least")},
+      {"minProperties", number_by(std::greater_equal(), &json::is_object, "keys", "least")},
+      {"properties", check_properties},
+      {"additionalProperties", check_other_keys},
+      {"required", check_required},
+      {"items", check_items}};
+  for (const auto& [name, check_it] : kKeywords) {
+    const auto argument = spot.schema.find(name);
+    if (argument != spot.schema.end()) check_it(spot, *argument, findings);
   }
 }
 

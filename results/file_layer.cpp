@@ -37,9 +37,7 @@ class Digest {
     std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
     unsigned size = 0;
     check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
-    std::string text;
-    for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", raw[i]);
-    return text;
+    return fmt::format("{:02x}", fmt::join(raw.begin(), raw.begin() + size, ""));
   }
 
  private:

@@ -47,12 +47,19 @@ Cause take_cause() {
   throw RecordError(fmt::format("{}: HDF5: {}", doing, cause.text.empty() ? "refused" : cause.text));
 }
 
-Handle text_type() {
+Handle fixed_text(std::size_t size) {
   Handle type = own(H5Tcopy(H5T_C_S1), "text type");
-  check(H5Tset_size(type.get(), H5T_VARIABLE), "text type");
+  check(H5Tset_size(type.get(), size), "text type");
+  return type;
+}
+
+Handle utf8_text(std::size_t size) {
+  Handle type = fixed_text(size);
   check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
   return type;
 }
+
+Handle text_type() { return utf8_text(H5T_VARIABLE); }
 
 Handle scalar_space() { return own(H5Screate(H5S_SCALAR), "scalar"); }
 
@@ -77,8 +84,7 @@ void get(const Handle& object, const char* name, hid_t memory_type, hssize_t ele
   check(H5Aread(attribute.get(), memory_type, value), doing);
 }
 
-template <class CreationList>
-Handle creation_list(hid_t kind, CreationList&& more) {
+Handle creation_list(hid_t kind, auto&& more) {
   Handle list = own(H5Pcreate(kind), "creation properties");
   check(H5Pset_obj_track_times(list.get(), false), "creation properties");
   check(H5Pset_attr_creation_order(list.get(), H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED), "creation properties");
@@ -90,12 +96,6 @@ Handle creation_list(hid_t kind, CreationList&& more) {
 
 void track_links(hid_t list) {
   check(H5Pset_link_creation_order(list, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED), "creation properties");
-}
-
-Handle fixed_text(std::size_t size) {
-  Handle type = own(H5Tcopy(H5T_C_S1), "text type");
-  check(H5Tset_size(type.get(), size), "text type");
-  return type;
 }
 
 void put_fixed_text(const Handle& object, const char* name, const std::string& value) {
@@ -115,8 +115,7 @@ Handle type_of(Stored stored) {
                            H5T_STD_U64LE, H5T_IEEE_F64LE, H5T_STD_I32LE};
   static_assert(static_cast<std::size_t>(Stored::text) == numbers.size(), "in the order of Stored");
   if (stored != Stored::text) return own(H5Tcopy(numbers[static_cast<std::size_t>(stored)]), "type");
-  Handle type = fixed_text(kEventTextBytes);
-  check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
+  Handle type = utf8_text(kEventTextBytes);
   check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
   return type;
 }

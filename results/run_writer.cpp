@@ -120,8 +120,7 @@ struct RunWriter::File {
     for_each_attribute(header, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
     hdf5::write_attribute(root, "configuration_sha256", sha256(header.load_cell.configuration_xml));
   }
-  template <class Each>
-  void for_each_series(Each&& each) {
+  void for_each_series(auto&& each) {
     each(load_cell);
     for (auto& channel : channels) each(channel);
     each(commands);

@@ -137,8 +137,7 @@ std::string quoted(const std::string& text) {
 struct Format {
   const StepMean& step;
   std::string operator()(std::string StepMean::*m) const { return quoted(step.*m); }
-  std::string operator()(int StepMean::*m) const { return std::to_string(step.*m); }
-  std::string operator()(std::uint64_t StepMean::*m) const { return std::to_string(step.*m); }
+  std::string operator()(auto StepMean::*m) const { return std::to_string(step.*m); }
   std::string operator()(double StepMean::*m) const { return std::isnan(step.*m) ? std::string() : shortest(step.*m); }
   std::string operator()(std::uint32_t StepMean::*m) const { return quality_flag_names(step.*m); }
 };

@@ -95,11 +95,8 @@ bool complete(const Raw& raw) noexcept {
 
 Measured compensate(const Raw& raw, const Calibration& calibration) noexcept {
   const Wide t_fine = fine_temperature(raw.temperature, calibration);
-  Measured measured;
-  measured.temperature_centi_c = static_cast<std::int32_t>((t_fine * 5 + 128) >> 8);
-  measured.pressure_256th_pa = pressure(raw.pressure, t_fine, calibration);
-  measured.humidity_1024th_rh = humidity(raw.humidity, t_fine, calibration);
-  return measured;
+  return {static_cast<std::int32_t>((t_fine * 5 + 128) >> 8), pressure(raw.pressure, t_fine, calibration),
+          humidity(raw.humidity, t_fine, calibration)};
 }
 
 }  // namespace bme280
@@ -159,15 +156,14 @@ void Bme280Sensor::find() {
   std::string why;
   for (const std::uint8_t address : {bme280::kAddressLow, bme280::kAddressHigh}) {
     address_ = address;
-    std::uint8_t id = 0;
+    why += fmt::format("{}0x{:02X}: ", why.empty() ? "" : "; ", address);
     try {
-      id = get(bme280::kIdRegister);
+      const std::uint8_t id = get(bme280::kIdRegister);
+      if (id == bme280::kId) return;
+      why += fmt::format("chip id 0x{:02X} instead of 0x60", id);
     } catch (const DeviceError& error) {
-      why += fmt::format("{}0x{:02X}: {}", why.empty() ? "" : "; ", address, error.what());
-      continue;
+      why += error.what();
     }
-    if (id == bme280::kId) return;
-    why += fmt::format("{}0x{:02X}: chip id 0x{:02X} instead of 0x60", why.empty() ? "" : "; ", address, id);
   }
   fail("find", why, "a BMP280 (0x58) has no humidity and is not supported");
 }

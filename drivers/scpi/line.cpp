@@ -59,8 +59,7 @@ std::string Tcp::query(std::string_view command) {
   return answer;
 }
 
-template <class Work>
-void Tcp::carry_out(std::string_view operation, Work&& work) {
+void Tcp::carry_out(std::string_view operation, auto&& work) {
   try {
     connection_->allow(timeout_);
     work();

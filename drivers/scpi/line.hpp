@@ -43,8 +43,7 @@ class Tcp final : public Line {
 
  private:
   void connect();
-  template <class Work>
-  void carry_out(std::string_view operation, Work&& work);
+  void carry_out(std::string_view operation, auto&& work);
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move);
 
   const std::string host_;
@@ -74,7 +73,8 @@ class Usbtmc : public Line {
   void take_remote_control();
   void clear();
   [[nodiscard]] bool receive_part(std::string& answer, bool may_be_empty);
-  void recover(const usb::Endpoint& endpoint, usb::Outcome outcome) noexcept;
+  [[noreturn]] void recover_and_fail(const usb::Endpoint& endpoint, usb::Outcome outcome, std::string_view operation,
+                                     const std::string& cause, const char* next_move = "");
   void abort(const usb::Endpoint& endpoint) noexcept;
   void drain() noexcept;
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");

@@ -104,8 +104,7 @@ void Usbtmc::write(std::string_view command) {
   const auto message = usbtmc::message_out(tag_, std::string(command) + "\n");
   const usb::Transfer sent = transport_.write(out_, message, timeout_);
   if (sent.outcome == usb::Outcome::done && sent.bytes == message.size()) return;
-  recover(out_, sent.outcome);
-  fail(command, usb::name_of(sent.outcome));
+  recover_and_fail(out_, sent.outcome, command, usb::name_of(sent.outcome));
 }
 
 std::string Usbtmc::query(std::string_view command) {
@@ -127,32 +126,26 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   tag_ = usbtmc::next_tag(tag_);
   const auto request = usbtmc::request_in(tag_, kPart);
   const usb::Transfer asked = transport_.write(out_, request, timeout_);
-  if (asked.outcome != usb::Outcome::done) {
-    recover(out_, asked.outcome);
-    fail("ask for the answer", usb::name_of(asked.outcome));
-  }
+  if (asked.outcome != usb::Outcome::done)
+    recover_and_fail(out_, asked.outcome, "ask for the answer", usb::name_of(asked.outcome));
   std::array<std::uint8_t, kRoom> buffer;
   usb::Transfer got = transport_.read(in_, buffer, timeout_);
   if (got.outcome == usb::Outcome::done && got.bytes == 0 && may_be_empty) got = transport_.read(in_, buffer, timeout_);
-  if (got.outcome != usb::Outcome::done) {
-    recover(in_, got.outcome);
-    fail("read the answer", usb::name_of(got.outcome), "check that the instrument knows this command");
-  }
+  if (got.outcome != usb::Outcome::done)
+    recover_and_fail(in_, got.outcome, "read the answer", usb::name_of(got.outcome),
+                     "check that the instrument knows this command");
   const auto header = usbtmc::answer_header(std::span(buffer).first(got.bytes), tag_);
   const bool goes_nowhere = header && header->bytes == 0 && !header->end_of_message;
-  if (!header || header->bytes > kPart || goes_nowhere) {
-    recover(in_, got.outcome);
-    fail("read the answer",
-         goes_nowhere ? "the answer is empty and does not end" : "the reply belongs to another request");
-  }
+  if (!header || header->bytes > kPart || goes_nowhere)
+    recover_and_fail(in_, got.outcome, "read the answer",
+                     goes_nowhere ? "the answer is empty and does not end" : "the reply belongs to another request");
   std::size_t have = std::min<std::size_t>(got.bytes - usbtmc::kHeaderBytes, header->bytes);
   answer.append(reinterpret_cast<const char*>(buffer.data()) + usbtmc::kHeaderBytes, have);
   while (have < header->bytes) {
     got = transport_.read(in_, buffer, timeout_);
-    if (got.outcome != usb::Outcome::done || got.bytes == 0) {
-      recover(in_, got.outcome);
-      fail("read the answer", got.bytes == 0 ? "the answer breaks off" : usb::name_of(got.outcome));
-    }
+    if (got.outcome != usb::Outcome::done || got.bytes == 0)
+      recover_and_fail(in_, got.outcome, "read the answer",
+                       got.bytes == 0 ? "the answer breaks off" : usb::name_of(got.outcome));
     const std::size_t more = std::min<std::size_t>(got.bytes, header->bytes - have);
     answer.append(reinterpret_cast<const char*>(buffer.data()), more);
     have += more;
@@ -160,11 +153,13 @@ bool Usbtmc::receive_part(std::string& answer, bool may_be_empty) {
   return header->end_of_message;
 }
 
-void Usbtmc::recover(const usb::Endpoint& endpoint, usb::Outcome outcome) noexcept {
+void Usbtmc::recover_and_fail(const usb::Endpoint& endpoint, usb::Outcome outcome, std::string_view operation,
+                              const std::string& cause, const char* next_move) {
+  const bool gone = outcome == usb::Outcome::gone;
   out_of_order_ = true;
-  if (outcome == usb::Outcome::gone) return;
-  if (outcome == usb::Outcome::timed_out || endpoint.in()) abort(endpoint);
-  (void)transport_.clear_halt(endpoint);
+  if (!gone && (outcome == usb::Outcome::timed_out || endpoint.in())) abort(endpoint);
+  if (!gone) (void)transport_.clear_halt(endpoint);
+  fail(operation, cause, next_move);
 }
 
 void Usbtmc::abort(const usb::Endpoint& endpoint) noexcept {

@@ -213,9 +213,8 @@ std::optional<Adapter> look_up_from(fs::path folder, const Roots& roots) {
 Adapter* follow(fs::path path, std::vector<Adapter>& adapters) {
   std::error_code none;
   for (int hops = 0; hops < 8; ++hops) {
-    for (Adapter& adapter : adapters) {
-      if (adapter.device == path) return &adapter;
-    }
+    const auto found = std::ranges::find(adapters, path, &Adapter::device);
+    if (found != adapters.end()) return &*found;
     const fs::path target = fs::read_symlink(path, none);
     if (none) break;
     path = (path.parent_path() / target).lexically_normal();

@@ -8,6 +8,8 @@
 #include <map>
 #include <string_view>
 
+#include "base/error.hpp"
+
 namespace kphi::sim {
 namespace {
 
@@ -35,8 +37,7 @@ Members members(const YAML::Node& map, const std::string& path) {
 }
 
 /// Gives a map of single values to `take`, and says where in it what `take` refuses is.
-template <class Take>
-void read_entry(const YAML::Node& node, const std::string& path, const char* next_move, Take&& take) {
+void read_entry(const YAML::Node& node, const std::string& path, const char* next_move, auto&& take) {
   const Members all = members(node, path);
   FaultEntry entry;
   for (const auto& [key, value] : all) {

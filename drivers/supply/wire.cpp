@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <iterator>
 
@@ -182,13 +183,9 @@ SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexc
                                SupplyProtection::over_power, SupplyProtection::over_temperature,
                                SupplyProtection::short_circuit};
   if (code == 0) return SupplyProtection::none;
-  if (map.protection_bits) {
-    for (std::size_t bit = 0; bit < kCauses.size(); ++bit) {
-      if ((code >> bit & 1) != 0) return kCauses[bit];
-    }
-    return SupplyProtection::unknown;
-  }
-  return code <= 3 ? kCauses[code - 1u] : SupplyProtection::unknown;
+  const std::size_t cause = map.protection_bits ? static_cast<std::size_t>(std::countr_zero(code)) : code - 1u;
+  const std::size_t known = map.protection_bits ? kCauses.size() : 3;
+  return cause < known ? kCauses[cause] : SupplyProtection::unknown;
 }
 
 std::uint16_t to_counts(double value, double counts_per_unit) noexcept {

@@ -199,7 +199,6 @@ Settling settle(std::span<const double> thrust, std::size_t first, std::size_t p
   const auto half_second = static_cast<std::size_t>(std::llround(kLeastWindow / bin_s));
   const std::size_t least = std::max(std::min(half_second, planned / 2), kLeastValues);
   if (n < first + least) return {std::min(first, n), false};
-  const auto tail = thrust.subspan(n - least);
   const std::size_t parts = n >= first + 2 * least ? 2 : 1;
   const Noise noise = noise_of(thrust.subspan(n - parts * least), parts);
   if (!(noise.freedom > 0)) return {n - least, false};
@@ -208,7 +207,7 @@ Settling settle(std::span<const double> thrust, std::size_t first, std::size_t p
   for (std::size_t begin = first; begin + least <= n; begin += stride) {
     if (steady(thrust.subspan(begin), noise, t)) return {begin, true};
   }
-  return {n - least, steady(tail, noise, student(noise.freedom, kUnsettledConfidence))};
+  return {n - least, steady(thrust.last(least), noise, student(noise.freedom, kUnsettledConfidence))};
 }
 
 bool drifts(std::span<const double> thrust) {

@@ -209,15 +209,13 @@ class Reduction {
 
   [[nodiscard]] StepMean named(const HeldStep& step) const {
     const RunHeader& header = run_.header;
-    StepMean mean;
-    mean.propeller = header.propeller_id;
-    mean.blades = header.blades;
-    mean.diameter_in = header.diameter_in;
-    mean.occlusion_deg = header.occlusion_deg;
-    mean.repetition = header.repetition;
-    mean.step = step.mark.step;
-    mean.commanded_speed_rad_s = step.mark.speed_rad_s;
-    return mean;
+    return {.propeller = header.propeller_id,
+            .blades = header.blades,
+            .diameter_in = header.diameter_in,
+            .occlusion_deg = header.occlusion_deg,
+            .repetition = header.repetition,
+            .step = step.mark.step,
+            .commanded_speed_rad_s = step.mark.speed_rad_s};
   }
 
   void take_load_cell(const HeldStep& step, std::size_t first, const StepEvidence& evidence, StepMean& mean) const {

@@ -6,6 +6,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -36,9 +37,10 @@ constexpr std::uint64_t StepMean::*kSums[] = {&StepMean::speed_n, &StepMean::thr
 constexpr double StepMean::*kUncertainties[] = {&StepMean::thrust_u_n, &StepMean::speed_u_rad_s, &StepMean::zero_u_n,
                                                 &StepMean::lag_u_s};
 
+double square(double x) { return x * x; }
+
 /// Mean of f(value) over the rows that have the value; NaN without any.
-template <class Function>
-double mean_over(const Group& group, double StepMean::*member, Function f) {
+double mean_over(const Group& group, double StepMean::*member, auto f) {
   double sum = 0;
   int n = 0;
   for (const StepMean* step : group) {
@@ -64,13 +66,9 @@ StepMean average(const Group& group) {
   const double n = static_cast<double>(group.size());
   StepMean mean = *group.front();
   mean.repetition = 0;
-  for (const auto member : kMeans) mean.*member = mean_over(group, member, [](double x) { return x; });
-  for (const auto member : kRootMeanSquares) {
-    mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }));
-  }
-  for (const auto member : kUncertainties) {
-    mean.*member = std::sqrt(mean_over(group, member, [](double x) { return x * x; }) / n);
-  }
+  for (const auto member : kMeans) mean.*member = mean_over(group, member, std::identity());
+  for (const auto member : kRootMeanSquares) mean.*member = std::sqrt(mean_over(group, member, square));
+  for (const auto member : kUncertainties) mean.*member = std::sqrt(mean_over(group, member, square) / n);
   mean.thrust_freedom = freedom_of(group);
   mean.thrust_n_eff = 0;
   for (const auto member : kSums) mean.*member = 0;
@@ -94,8 +92,6 @@ std::vector<Group> groups_of(std::span<const StepMean> steps, Key key_of) {
   }
   return groups;
 }
-
-double square(double x) { return x * x; }
 
 /// Standard uncertainty of the thrust at this speed, N: from the samples and from the uncertainty of the speed.
 double u_within(const StepMean& step) {

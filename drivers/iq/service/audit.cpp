@@ -20,10 +20,7 @@ constexpr double kSlowSlew = 100;                                   // V/s; the 
 
 int bits(const std::optional<double>& value) { return value && *value > 0 ? static_cast<int>(*value) : 0; }
 
-template <class Enum>
-bool is(const std::optional<double>& value, Enum code) {
-  return bits(value) == static_cast<int>(code);
-}
+bool is(const std::optional<double>& value, auto code) { return bits(value) == static_cast<int>(code); }
 
 /// Known, and below full scale.
 bool derates(const std::optional<double>& value, double none) { return value && !(*value >= none); }

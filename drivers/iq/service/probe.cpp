@@ -46,8 +46,7 @@ class Search {
     }
   }
   /// Asks this id, and gives each id that answers within `wall` of the last byte sent to `heard`.
-  template <class Heard>
-  void ask(int module_id, Duration wall, Heard&& heard) {
+  void ask(int module_id, Duration wall, auto&& heard) {
     send(make(kAsked, Access::get, module_id));
     const auto end = steady_clock::now() + wall + on_wire(port_.unsent(), port_.baud());
     for (bool enough = false; !enough && port_.wait(end - steady_clock::now());) {

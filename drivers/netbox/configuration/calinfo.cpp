@@ -19,7 +19,7 @@ constexpr std::uint16_t kHeader = 0x1234;
 
 /// 0 for an unknown code.
 double si_of(std::span<const Unit> units, int code) {
-  const auto known = std::ranges::find_if(units, [&](const Unit& unit) { return unit.code == code; });
+  const auto known = std::ranges::find(units, code, &Unit::code);
   return known == units.end() ? 0 : known->si;
 }
 
@@ -31,12 +31,7 @@ std::array<std::uint8_t, 20> encode_read_calinfo() noexcept { return {kReadCalin
 
 std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kCalinfoBytes || boost::endian::load_big_u16(bytes.data()) != kHeader) return std::nullopt;
-  Calinfo calinfo;
-  calinfo.force_unit = bytes[2];
-  calinfo.torque_unit = bytes[3];
-  calinfo.counts_per_force = boost::endian::load_big_u32(&bytes[4]);
-  calinfo.counts_per_torque = boost::endian::load_big_u32(&bytes[8]);
-  return calinfo;
+  return Calinfo{bytes[2], bytes[3], boost::endian::load_big_u32(&bytes[4]), boost::endian::load_big_u32(&bytes[8])};
 }
 
 Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout) {

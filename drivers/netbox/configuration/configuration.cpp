@@ -8,6 +8,7 @@
 #include <iterator>
 #include <pugixml.hpp>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/error.hpp"
@@ -76,8 +77,7 @@ class Elements {
     const std::vector<std::string> parts = parts_of(value);
     std::array<double, 6> numbers{};
     if (parts.size() != numbers.size()) refuse(fmt::format("<{}> is \"{}\", not six numbers", name, value), kAskForXml);
-    std::transform(parts.begin(), parts.end(), numbers.begin(),
-                   [&](const std::string& part) { return parse_number(name, part); });
+    std::ranges::transform(parts, numbers.begin(), [&](const auto& part) { return parse_number(name, part); });
     return numbers;
   }
 
@@ -130,26 +130,18 @@ class Elements {
 };
 
 /// Rates of the Axia's converter: what it shows, and what all five are rounded down from.
-struct AxiaRate {
-  int shown;
-  double true_hz;
-};
-constexpr AxiaRate kAxiaRates[] = {
+constexpr std::pair<int, double> kAxiaRates[] = {
     {488, 7812.5 / 16}, {976, 7812.5 / 8}, {1953, 7812.5 / 4}, {3906, 7812.5 / 2}, {7812, 7812.5}};
 
 /// What a product's name contains, letters only, small.
-struct ProductName {
-  const char* part;
-  Product kind;
-};
-constexpr ProductName kProductNames[] = {
+constexpr std::pair<const char*, Product> kProductNames[] = {
     {"axia", Product::axia}, {"netft", Product::net_box}, {"netbox", Product::net_box}};
 
 Product kind_of(const Elements& elements, const Configuration& configuration) {
   std::string name = boost::algorithm::to_lower_copy(configuration.product);
   std::erase_if(name, [](char c) { return c < 'a' || c > 'z'; });
-  for (const ProductName& known : kProductNames) {
-    if (boost::algorithm::contains(name, known.part)) return known.kind;
+  for (const auto& [part, kind] : kProductNames) {
+    if (boost::algorithm::contains(name, part)) return kind;
   }
   // Only the Axia has the rate of its converter in its XML; the Net Box's firmware is 1.x or 2.x.
   if (!elements.optional_text("setrate").empty()) return Product::axia;
@@ -204,8 +196,8 @@ void read_scale(const Elements& elements, Configuration& configuration) {
 double device_rate_hz(const Elements& elements, Product kind) {
   if (kind == Product::axia && !elements.optional_text("setrate").empty()) {
     const int shown = elements.whole_number("setrate", 1, 1'000'000);
-    for (const AxiaRate& rate : kAxiaRates) {
-      if (rate.shown == shown) return rate.true_hz;
+    for (const auto& [known, true_hz] : kAxiaRates) {
+      if (known == shown) return true_hz;
     }
     elements.refuse(fmt::format("<setrate> is {}: an Ethernet Axia has 488, 976, 1953, 3906 and 7812 Hz", shown),
                     "choose one of these on the sensor's Settings page");

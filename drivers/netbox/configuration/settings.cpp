@@ -244,16 +244,14 @@ SettingsKeeper::SettingsKeeper(Address address, const WantedSettings& wanted, st
   try {
     apply(wanted);
   } catch (...) {
-    try {
-      restore();
-    } catch (const std::exception&) {
-      // The journal stays; the first failure is the one to tell.
-    }
-    throw;
+    try_to_restore();
+    throw;  // the first failure is the one to tell
   }
 }
 
-SettingsKeeper::~SettingsKeeper() {
+SettingsKeeper::~SettingsKeeper() { try_to_restore(); }
+
+void SettingsKeeper::try_to_restore() {
   try {
     restore();
   } catch (const std::exception&) {

@@ -70,6 +70,7 @@ class SettingsKeeper {
 
  private:
   void apply(const WantedSettings& wanted);
+  void try_to_restore();
 
   const Address address_;
   const std::filesystem::path journal_;

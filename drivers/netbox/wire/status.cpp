@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 namespace kphi::netbox {
 namespace {
 
-struct Bit {
-  int number;
-  const char* name;
-};
+using Bit = std::pair<int, const char*>;  // number and name
 
 constexpr Bit kNetBox[] = {
     {1, "HTTP protocol failure"},
@@ -61,8 +59,8 @@ constexpr Bit kAxia[] = {
 
 std::string name_of(int bit, Product product) {
   const auto table = product == Product::axia ? std::span<const Bit>(kAxia) : std::span<const Bit>(kNetBox);
-  const auto entry = std::ranges::find_if(table, [&](const Bit& known) { return known.number == bit; });
-  return entry == table.end() ? "bit " + std::to_string(bit) : entry->name;
+  const auto entry = std::ranges::find(table, bit, &Bit::first);
+  return entry == table.end() ? "bit " + std::to_string(bit) : entry->second;
 }
 
 }  // namespace

@@ -154,8 +154,7 @@ std::string body_of(const std::string& answer) {
 }
 
 /// The page with the line of element `tag`, if it has one, replaced by `edit(line)`.
-template <class Edit>
-std::string with_element(const std::string& answer, const std::string& tag, Edit edit,
+std::string with_element(const std::string& answer, const std::string& tag, auto edit,
                          std::string_view type = "text/xml") {
   std::string body = body_of(answer);
   const std::size_t begin = body.find("<" + tag + ">");
