@@ -69,7 +69,7 @@ void LoadCellColumns::reset(std::size_t records) {
 void LoadCellColumns::take(std::size_t first, std::span<const Counts> counts, std::span<const std::uint32_t> status,
                            std::span<const Nanoseconds> arrival_ns, const RunHeader& header) {
   const Limits limits(header.load_cell);
-  const auto axis = static_cast<std::size_t>(header.thrust_axis);
+  const auto axis = static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
   Four reached{};
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {

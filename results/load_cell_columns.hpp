@@ -33,6 +33,8 @@ struct HugePages {
     return static_cast<T*>(memory);
   }
   void deallocate(T* memory, std::size_t) { std::free(memory); }
+  /// Without a value: what is read into a column needs no zeros before.
+  void construct(T* number) { ::new (number) T; }
   bool operator==(const HugePages&) const = default;
 };
 

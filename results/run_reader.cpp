@@ -8,6 +8,7 @@
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <span>
 
 #include "results/hdf5.hpp"
@@ -68,10 +69,12 @@ void check_codes(const RunGroup<Row>& layout, const RunColumn<Row>& column, std:
   }
 }
 
+/// Behind those that are there.
 template <class Row>
-std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
+void append_rows(std::vector<Row>& rows, const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
   GroupReader<Row> group(parent, layout, file);
-  std::vector<Row> rows(group.rows);
+  const std::size_t first = rows.size();
+  rows.resize(first + group.rows);
   std::vector<std::byte> bytes;
   for (std::uint64_t at = 0; at < group.rows; at += kBlock) {
     const std::uint64_t n = std::min(kBlock, group.rows - at);
@@ -80,9 +83,15 @@ std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, cons
       bytes.resize(n * bytes_of(column.stored));
       group.columns[i].read(at, n, bytes.data());
       check_codes(group.layout, column, bytes, at, file);
-      column.unpack(bytes.data(), std::span(rows).subspan(at, n));
+      column.unpack(bytes.data(), std::span(rows).subspan(first + at, n));
     }
   }
+}
+
+template <class Row>
+std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
+  std::vector<Row> rows;
+  append_rows(rows, parent, layout, file);
   return rows;
 }
 
@@ -90,11 +99,12 @@ std::vector<MotorReading> motor_of(const Handle& root, const std::string& file) 
   const Handle motor = hdf5::open_group(root, "motor");
   std::vector<MotorReading> readings;
   for (const MotorChannelInfo& info : kMotorChannels) {
-    auto rows = rows_of(motor, motor_group(info), file);
+    const std::size_t before = readings.size();
+    append_rows(readings, motor, motor_group(info), file);
+    const auto rows = std::span(readings).subspan(before);
     const auto earlier = [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; };
     if (!std::ranges::is_sorted(rows, earlier)) std::ranges::stable_sort(rows, earlier);
     for (MotorReading& row : rows) row.channel = info.channel;
-    readings.insert(readings.end(), rows.begin(), rows.end());
   }
   return readings;
 }
@@ -126,8 +136,7 @@ RunRecording all_but_samples(const Handle& root, const std::filesystem::path& pa
 }
 
 /// One error text per file, however deep it arose.
-template <class Read>
-auto naming(const std::filesystem::path& path, Read&& read) {
+auto naming(const std::filesystem::path& path, auto&& read) {
   try {
     return read();
   } catch (const RecordError& error) {
@@ -239,6 +248,23 @@ void check_scale(const RunHeader& header, Problems& problems) {
   if (std::abs(header.spin) != 1) problems.push_back(fmt::format("spin is {}", header.spin));
 }
 
+/// Records that are missing between two.
+std::uint64_t lost_between(std::uint32_t earlier, std::uint32_t later, std::uint32_t ft_stride) {
+  const auto ahead = static_cast<std::int32_t>(later - earlier);
+  const std::uint32_t stride = std::max(ft_stride, 1u);
+  return ahead <= 0 ? 0 : std::max(1u, (static_cast<std::uint32_t>(ahead) + stride / 2) / stride) - 1;
+}
+
+/// Of a run without its ending, by the ft_sequence of its records.
+SampleAccount account_of(const auto& ft_sequence, std::uint32_t ft_stride) {
+  SampleAccount account;
+  account.received = ft_sequence.size();
+  for (std::size_t i = 1; i < ft_sequence.size(); ++i)
+    account.lost_network += lost_between(ft_sequence[i - 1], ft_sequence[i], ft_stride);
+  account.expected = account.received + account.lost_network;
+  return account;
+}
+
 }  // namespace
 
 RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) {
@@ -248,6 +274,7 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
     const Handle root = hdf5::open_file(path);
     RunRecording run = all_but_samples(root, path);
     GroupReader<LoadCellRecord> group(root, kLoadCellGroup, path.string());
+    const bool ended = has_ending(root);
     one_at_a_time.unlock();
     cell.reset(group.rows);
     group.columns[2].read(0, group.rows, cell.ft_sequence.data());
@@ -263,6 +290,7 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
       group.columns[4].read(at, counts.size(), arrival_ns.data());
       cell.take(at, counts, status, arrival_ns, run.header);
     }
+    if (!ended) run.account = account_of(cell.ft_sequence, run.header.load_cell.ft_stride);
     return run;
   });
 }
@@ -272,10 +300,9 @@ RunRecording read_run(const std::filesystem::path& path) {
     const Handle root = hdf5::open_file(path);
     RunRecording run = all_but_samples(root, path);
     run.load_cell = rows_of(root, kLoadCellGroup, path.string());
-    if (has_ending(root)) return run;
-    run.account.received = run.load_cell.size();
-    run.account.lost_network = check_sequence(run.load_cell, run.header.load_cell.ft_stride).lost;
-    run.account.expected = run.account.received + run.account.lost_network;
+    if (!has_ending(root))
+      run.account = account_of(run.load_cell | std::views::transform(&LoadCellRecord::ft_sequence),
+                               run.header.load_cell.ft_stride);
     return run;
   });
 }
@@ -292,8 +319,7 @@ SequenceCheck check_sequence(const std::vector<LoadCellRecord>& records, std::ui
     } else if (ft < 0) {
       ++found.reboots;
     } else {
-      found.lost +=
-          std::max(1u, (static_cast<std::uint32_t>(ft) + ft_stride / 2) / static_cast<std::uint32_t>(stride)) - 1;
+      found.lost += lost_between(records[i - 1].ft_sequence, records[i].ft_sequence, ft_stride);
       found.restarts += rdt <= 0;
       found.off_stride += rdt > 0 && ft % stride != 0;  // a stream begins anew at any sample of the box
     }

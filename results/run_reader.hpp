@@ -14,8 +14,8 @@ namespace kphi::results {
 /// The whole run; of a .part the rows valid at its last sync, as aborted. Does not check checksums; see verify_run().
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
-/// As read_run(), but quicker, with the load-cell records as columns in `cell`, whose memory is used again:
-/// `run.load_cell` stays empty, and so does the account of a .part.
+/// As read_run(), but quicker, with the load-cell records as columns in `cell`, whose memory is used again;
+/// `run.load_cell` stays empty.
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell);
 
 /// Gaps and restarts in a stream of records, by its sequence numbers.

@@ -24,10 +24,13 @@ std::vector<double> every_nth(const std::vector<double>& values, std::size_t mos
 
 double seconds(Nanoseconds time) { return 1e-9 * static_cast<double>(time); }
 
-/// Of the thrust axis, N; zero not subtracted.
-double thrust_of(const LoadCellRecord& record, const results::RunHeader& header) {
-  const auto axis = static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
-  return record.counts[axis] * (header.thrust_sign / header.load_cell.counts_per_newton);
+/// Calls take(arrival, thrust) for every sample: s from the start of the run; N, zero not subtracted.
+void for_each_sample(const results::RunRecording& run, const results::LoadCellColumns& cell, auto&& take) {
+  const double newton_per_count = run.header.thrust_sign / run.header.load_cell.counts_per_newton;
+  std::size_t i = 0;
+  for (const auto& [end, arrival_ns] : cell.datagrams) {
+    for (; i < end; ++i) take(seconds(arrival_ns), cell.force[i] * newton_per_count);
+  }
 }
 
 std::vector<std::string> event_lines(const results::RunRecording& run) {
@@ -45,18 +48,19 @@ bool is_run_of(const RunProvenance& run, const results::StepMean& step) {
          results::run_file_name(step.propeller, step.occlusion_deg, step.repetition);
 }
 
-std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step, std::size_t most) {
+std::vector<double> thrust_samples(const results::RunRecording& run, const results::LoadCellColumns& cell,
+                                   const results::StepMean& step, std::size_t most) {
   std::vector<double> samples;
-  for (const LoadCellRecord& record : run.load_cell) {
-    const double time_s = seconds(record.arrival_ns);
-    if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(thrust_of(record, run.header));
-  }
+  for_each_sample(run, cell, [&](double time_s, double thrust_n) {
+    if (time_s >= step.window_begin_s && time_s <= step.window_end_s) samples.push_back(thrust_n);
+  });
   const double shift = step.thrust_n - mean(samples);
   for (double& sample : samples) sample += shift;
   return every_nth(samples, most);
 }
 
-std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step) {
+std::optional<Settling> settling_of(const results::RunRecording& run, const results::LoadCellColumns& cell,
+                                    const results::StepMean& step) {
   constexpr double kBefore_s = 0.15, kBin_s = 0.01;
   const auto command = std::ranges::find_if(run.phases, [&](const results::PhaseMark& mark) {
     return mark.phase == results::Phase::step && mark.step == step.step;
@@ -75,13 +79,12 @@ std::optional<Settling> settling_of(const results::RunRecording& run, const resu
   }
   std::map<int, std::vector<double>> bins;
   std::vector<double> averaged;
-  for (const LoadCellRecord& record : run.load_cell) {
-    const double t = seconds(record.arrival_ns) - zero_s;
-    if (!inside(t)) continue;
-    const double thrust = thrust_of(record, run.header);
-    bins[static_cast<int>(std::floor(t / kBin_s))].push_back(thrust);
-    if (t >= settling.window_begin_s) averaged.push_back(thrust);
-  }
+  for_each_sample(run, cell, [&](double time_s, double thrust_n) {
+    const double t = time_s - zero_s;
+    if (!inside(t)) return;
+    bins[static_cast<int>(std::floor(t / kBin_s))].push_back(thrust_n);
+    if (t >= settling.window_begin_s) averaged.push_back(thrust_n);
+  });
   if (averaged.empty()) return std::nullopt;
   const double shift = step.thrust_n - mean(averaged);  // the zero
   for (const auto& [bin, values] : bins) settling.thrust_n.push_back({(bin + 0.5) * kBin_s, mean(values) + shift});
@@ -100,21 +103,22 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
   std::map<double, std::vector<double>> by_angle;
   std::size_t found = 0;
   std::optional<Settling> settling;
+  results::LoadCellColumns cell;
   for (RunProvenance& run : runs) {
     const std::filesystem::path path = folder / run.file;
     std::error_code unknown;
     if (!std::filesystem::exists(path, unknown)) continue;
-    const results::RunRecording recording = results::read_run(path);
+    const results::RunRecording recording = results::read_run(path, cell);
     run.account = recording.account;
     run.outcome = recording.outcome == results::Outcome::complete ? "complete" : "aborted: " + recording.outcome_reason;
     run.events = event_lines(recording);
     for (const results::StepMean& step : top) {
       if (!is_run_of(run, step)) continue;
       if (!settling) {
-        settling = settling_of(recording, step);
+        settling = settling_of(recording, cell, step);
         if (settling) settling->run = path.filename().string();
       }
-      const auto samples = thrust_samples(recording, step, kSamplesPerAngle / repetitions[step.occlusion_deg]);
+      const auto samples = thrust_samples(recording, cell, step, kSamplesPerAngle / repetitions[step.occlusion_deg]);
       auto& all = by_angle[step.occlusion_deg];
       all.insert(all.end(), samples.begin(), samples.end());
       found += samples.empty() ? 0 : 1;

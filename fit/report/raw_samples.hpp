@@ -7,6 +7,7 @@
 
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/report/figures.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 #include "results/step_mean.hpp"
 
@@ -15,13 +16,15 @@ namespace kphi::fit {
 /// Whether the step was measured in this run, by the name of its file.
 [[nodiscard]] bool is_run_of(const RunProvenance& run, const results::StepMean& step);
 
-/// At most `most` samples of the run inside the step's window, evenly taken, in N. Arrival stamps cut the window less
-/// sharply than the reduction did, so the samples are shifted to the step's own mean.
-[[nodiscard]] std::vector<double> thrust_samples(const results::RunRecording& run, const results::StepMean& step,
-                                                 std::size_t most);
+/// At most `most` samples of the run, whose load-cell records are in `cell`, inside the step's window, evenly taken, in
+/// N. Arrival stamps cut the window less sharply than the reduction did, so the samples are shifted to the step's own
+/// mean.
+[[nodiscard]] std::vector<double> thrust_samples(const results::RunRecording& run, const results::LoadCellColumns& cell,
+                                                 const results::StepMean& step, std::size_t most);
 
 /// How `run` came to `step`. nullopt if the run has no mark of it or no sample in its window.
-[[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run, const results::StepMean& step);
+[[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run,
+                                                  const results::LoadCellColumns& cell, const results::StepMean& step);
 
 struct RawSamples {
   std::vector<ThrustShares> shares;  ///< empty when some run of the top speed is not in the folder

@@ -186,6 +186,7 @@ TEST_F(RunFile, AbortedRunsKeepTheirReasonAndNeverReplaceEachOther) {
 }
 
 TEST_F(RunFile, DestructorLeavesAReadablePart) {
+  run.load_cell.erase(run.load_cell.begin() + 1000);
   {
     RunWriter writer(path, run.header);
     write_pieces(writer, run);
@@ -194,6 +195,25 @@ TEST_F(RunFile, DestructorLeavesAReadablePart) {
   EXPECT_TRUE(same_rows(run.load_cell, again.load_cell));
   EXPECT_EQ(again.outcome, Outcome::aborted);
   EXPECT_THAT(verify_run(folder / "a.h5.part").problems, Contains(HasSubstr("stopped before the end")));
+  LoadCellColumns columns;
+  const RunRecording quick = read_run(folder / "a.h5.part", columns);
+  EXPECT_EQ(columns.force.size(), again.load_cell.size());
+  EXPECT_EQ(again.account.lost_network, 1u);
+  EXPECT_EQ(quick.account.lost_network, 1u);
+  EXPECT_EQ(quick.account.expected, again.account.expected);
+}
+
+TEST_F(RunFile, ReadsAThrustAxisThatIsNoneAsTheNearest) {
+  run.header.thrust_axis = 100'000;
+  {
+    RunWriter writer(path, run.header);
+    write_pieces(writer, run);
+  }
+  LoadCellColumns columns;
+  (void)read_run(folder / "a.h5.part", columns);
+  ASSERT_EQ(columns.force.size(), run.load_cell.size());
+  EXPECT_EQ(columns.force.front(), run.load_cell.front().counts[2]);
+  EXPECT_EQ(columns.torque.front(), run.load_cell.front().counts[5]);
 }
 
 TEST_F(RunFile, FinishRefusesARunWhoseLossesDoNotAddUp) {

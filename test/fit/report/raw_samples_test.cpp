@@ -26,6 +26,10 @@ results::RunRecording recording() {
   return run;
 }
 
+std::vector<double> samples_of(const results::StepMean& step, std::size_t most) {
+  return thrust_samples(recording(), recording().load_cell, step, most);
+}
+
 results::StepMean step() {
   results::StepMean result;
   result.window_begin_s = 2;
@@ -35,18 +39,18 @@ results::StepMean step() {
 }
 
 TEST(RawSamples, ScatterAboutTheStepsMeanInsideItsWindow) {
-  const auto samples = thrust_samples(recording(), step(), 10000);
+  const auto samples = samples_of(step(), 10000);
   ASSERT_EQ(samples.size(), 1000u);
   EXPECT_NEAR(std::accumulate(samples.begin(), samples.end(), 0.0) / 1000, 1.75, 1e-9);
   EXPECT_NEAR(samples[1] - samples[0], 0.001, 1e-12) << "the sign of the axis is applied";
 }
 
 TEST(RawSamples, AreAsManyAsWantedAndNoneOutsideTheRun) {
-  for (const std::size_t most : {100u, 666u}) EXPECT_EQ(thrust_samples(recording(), step(), most).size(), most);
+  for (const std::size_t most : {100u, 666u}) EXPECT_EQ(samples_of(step(), most).size(), most);
   auto late = step();
   late.window_begin_s = 10;
   late.window_end_s = 11;
-  EXPECT_TRUE(thrust_samples(recording(), late, 100).empty());
+  EXPECT_TRUE(samples_of(late, 100).empty());
 }
 
 TEST(RawSamples, AreNotShownWhenARunIsMissing) {
