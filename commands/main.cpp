@@ -33,12 +33,6 @@ constexpr const char* kFooter =
     "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
     "                            --vehicle profiles/foldable_drone.yaml";
 
-/// A failed write says as much as these signals, and leaves the program alive to coast the motor.
-void ignore_signals_of_writes() {
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
-}
-
 /// A file that is opened later must not get the number of a closed standard stream: messages would go into the file.
 /// The replacement can be neither read nor written.
 void fill_closed_streams() {
@@ -123,7 +117,9 @@ ExitCode run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ignore_signals_of_writes();
+  // A failed write says as much as these signals, and leaves the program alive to coast the motor.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   fill_closed_streams();
   return end(run(argc, argv));
 }

@@ -24,10 +24,8 @@ bool finite(const Hinge& hinge) noexcept {
 
 Refusal refusal_of_body(const Airframe& airframe) noexcept {
   if (!airframe.polygon) return one_corner_each(airframe.hinge_turns) ? Refusal::none : Refusal::hinge_turns;
-  for (const Hinge& hinge : airframe.polygon->hinges) {
-    if (!finite(hinge)) return Refusal::hinges;
-  }
-  return Refusal::none;
+  const auto& hinges = airframe.polygon->hinges;
+  return std::all_of(hinges.begin(), hinges.end(), finite) ? Refusal::none : Refusal::hinges;
 }
 
 Refusal refusal_of(const Airframe& airframe) noexcept {

@@ -71,10 +71,7 @@ void CampaignReview::add(const std::string& run, const std::vector<StepMean>& me
                         {"reached_rad_s", lesson->reached.value()},
                         {"cap_rad_s", lesson->cap.value()}});
   }
-  if (campaign_.order.steps == profiles::StepOrderKind::up_and_down) report_hysteresis(run, means);
-}
-
-void CampaignReview::report_hysteresis(const std::string& run, const std::vector<StepMean>& means) {
+  if (campaign_.order.steps != profiles::StepOrderKind::up_and_down) return;
   const auto hysteresis = hysteresis_of(means);
   if (!hysteresis) return;
   progress_.say(fmt::format("{}: {}", run, hysteresis->to_words()));

@@ -39,7 +39,6 @@ class CampaignReview {
   void conclude();
 
  private:
-  void report_hysteresis(const std::string& run, const std::vector<results::StepMean>& means);
   void sort();
   const profiles::Campaign& campaign_;
   Progress& progress_;

@@ -1,6 +1,7 @@
 #include "daq/live/messages.hpp"
 
 #include <cmath>
+#include <iterator>
 
 #include "base/json.hpp"
 
@@ -111,10 +112,7 @@ std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits
   const auto drop_unknown = [](ordered_json& object) {
     for (auto item = object.begin(); item != object.end();) {
       const bool unknown = item->is_number_float() && !std::isfinite(item->get<double>());
-      if (unknown)
-        item = object.erase(item);
-      else
-        ++item;
+      item = unknown ? object.erase(item) : std::next(item);
     }
   };
   drop_unknown(message);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "base/number.hpp"
 #include "base/statistics.hpp"
@@ -44,21 +45,18 @@ double axis_reach(std::vector<double> values, double least) {
 
 // ---- the paper's figure ------------------------------------------------------------------------------------
 
-/// Highest share in the figure, with room for its box.
-double share_top(const Identification& identification, const std::vector<ThrustShares>& shares) {
+/// Lowest share in the figure: 0, or lower where samples are, since near zero thrust their noise reaches below. Highest
+/// share, with room for its box.
+std::pair<double, double> share_range(const Identification& identification, const std::vector<ThrustShares>& shares) {
   const compensation::ThrustCurve curve = identification.curve();
-  double top = 100 * std::max(1.0, curve.at(Radians(0)) / curve.thrust_coefficient());
-  for (const auto& entry : shares)
-    for (const double percent : entry.percent) top = std::max(top, percent);
-  return 10 * std::ceil((top + 3) / 10);
-}
-
-/// 0, or lower where samples are: near zero thrust their noise reaches below.
-double share_bottom(const std::vector<ThrustShares>& shares) {
-  double bottom = 0;
-  for (const auto& entry : shares)
-    for (const double percent : entry.percent) bottom = std::min(bottom, percent);
-  return 10 * std::floor(bottom / 10);
+  double bottom = 0, top = 100 * std::max(1.0, curve.at(Radians(0)) / curve.thrust_coefficient());
+  for (const auto& entry : shares) {
+    for (const double percent : entry.percent) {
+      bottom = std::min(bottom, percent);
+      top = std::max(top, percent);
+    }
+  }
+  return {10 * std::floor(bottom / 10), 10 * std::ceil((top + 3) / 10)};
 }
 
 /// The curve with its 95 % interval, by the whole budget.
@@ -72,8 +70,8 @@ std::string curve_rows(const std::vector<CurveBand>& band, double from_deg, doub
 
 std::string share_axes(const Identification& identification, const std::vector<ThrustShares>& shares) {
   const auto& table = identification.table;
-  const double bottom = share_bottom(shares), top = share_top(identification, shares),
-               K_T = identification.thrust_coefficient().value;
+  const auto [bottom, top] = share_range(identification, shares);
+  const double K_T = identification.thrust_coefficient().value;
   double gap = 60;  // boxes are as wide as the angles allow without touching
   std::string tics;
   for (std::size_t i = 0; i < table.size(); ++i) {
