@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
-#include <ranges>
 #include <span>
 
 #include "results/hdf5.hpp"
@@ -255,12 +255,13 @@ std::uint64_t lost_between(std::uint32_t earlier, std::uint32_t later, std::uint
   return ahead <= 0 ? 0 : std::max(1u, (static_cast<std::uint32_t>(ahead) + stride / 2) / stride) - 1;
 }
 
-/// Of a run without its ending, by the ft_sequence of its records.
-SampleAccount account_of(const auto& ft_sequence, std::uint32_t ft_stride) {
+/// Of a run without its ending, by the ft_sequence of its `rows`.
+SampleAccount account_of(const auto& rows, std::uint32_t ft_stride, auto ft_sequence) {
   SampleAccount account;
-  account.received = ft_sequence.size();
-  for (std::size_t i = 1; i < ft_sequence.size(); ++i)
-    account.lost_network += lost_between(ft_sequence[i - 1], ft_sequence[i], ft_stride);
+  account.received = rows.size();
+  for (std::size_t i = 1; i < rows.size(); ++i)
+    account.lost_network +=
+        lost_between(std::invoke(ft_sequence, rows[i - 1]), std::invoke(ft_sequence, rows[i]), ft_stride);
   account.expected = account.received + account.lost_network;
   return account;
 }
@@ -290,7 +291,7 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
       group.columns[4].read(at, counts.size(), arrival_ns.data());
       cell.take(at, counts, status, arrival_ns, run.header);
     }
-    if (!ended) run.account = account_of(cell.ft_sequence, run.header.load_cell.ft_stride);
+    if (!ended) run.account = account_of(cell.ft_sequence, run.header.load_cell.ft_stride, std::identity());
     return run;
   });
 }
@@ -301,8 +302,7 @@ RunRecording read_run(const std::filesystem::path& path) {
     RunRecording run = all_but_samples(root, path);
     run.load_cell = rows_of(root, kLoadCellGroup, path.string());
     if (!has_ending(root))
-      run.account = account_of(run.load_cell | std::views::transform(&LoadCellRecord::ft_sequence),
-                               run.header.load_cell.ft_stride);
+      run.account = account_of(run.load_cell, run.header.load_cell.ft_stride, &LoadCellRecord::ft_sequence);
     return run;
   });
 }

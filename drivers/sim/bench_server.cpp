@@ -107,7 +107,7 @@ void Server::run() {
     behind = goal < now;
     while (reached_ < goal) {
       reached_ = std::min(goal, reached_ + step_size);
-      step(reached_);
+      step(clock);
     }
     follow_the_address();
     open_or_close_web();
@@ -146,17 +146,17 @@ StreamReply Server::in_wall_time(StreamReply reply) const {
   return reply;
 }
 
-void Server::step(Instant now) {
-  bench_.advance(now);
-  log_motion(now);
+void Server::step(const Clock& clock) {
+  bench_.advance(reached_);
+  log_motion(reached_);
   hear_requests();
-  hear_motor(now);
-  log_motion(now);
+  hear_motor(clock.now());
+  log_motion(reached_);
   send_datagrams();
   send_motor();
   if (!supply_) return;
-  supply_->receive(*bench_.supply(), now);
-  supply_->send(*bench_.supply(), now);
+  supply_->receive(*bench_.supply(), reached_);
+  supply_->send(*bench_.supply(), reached_);
 }
 
 void Server::hear_requests() {
@@ -180,7 +180,7 @@ void Server::hear_motor(Instant now) {
   IqLine& line = bench_.motor_line();
   line.host_rate(pty_.baud());
   line.send(std::span(bytes).first(count), now);
-  line.advance(now);
+  line.advance(reached_);
 }
 
 void Server::log_motion(Instant now) {

@@ -59,7 +59,7 @@ class Server {
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
  private:
-  void step(Instant now);
+  void step(const Clock& clock);
   void hear_requests();
   void hear_motor(Instant now);
   void log_motion(Instant now);

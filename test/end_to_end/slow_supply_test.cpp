@@ -27,7 +27,9 @@ std::filesystem::path the_run_in(const std::filesystem::path& results) {
 }
 
 TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
-  RunningBench bench({1, 7000, late_answer(2.2) + late_answer(3.6) + late_answer(5.0) + late_answer(6.4), true});
+  std::string late_answers;  // until long after the slowest build has begun its run
+  for (int i = 0; i < 20; ++i) late_answers += late_answer(2.2 + 1.4 * i);
+  RunningBench bench({1, 7000, late_answers, true});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
   Process run(bench.run_command());
   ASSERT_EQ(run.wait(), 0) << run.err();
