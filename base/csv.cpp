@@ -11,12 +11,13 @@ namespace kphi {
 namespace {
 
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-constexpr std::string_view kBlanks = " \t";
+
+constexpr bool is_blank(char c) { return c == ' ' || c == '\t'; }
 
 std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
 }
 
 /// Takes the next line off the front of `rest`, without its end.
@@ -28,9 +29,9 @@ std::string_view next_line(std::string_view& rest) {
   return line;
 }
 
-/// The quoted field at the front of `rest`; nullopt if its closing quote is missing.
-std::optional<std::string> take_quoted(std::string_view& rest) {
-  std::string field;
+/// The quoted field at the front of `rest` into `field`; false if its closing quote is missing.
+bool take_quoted(std::string_view& rest, std::string& field) {
+  field.clear();
   for (std::size_t i = 1; i < rest.size(); ++i) {
     if (rest[i] != '"') {
       field += rest[i];
@@ -38,56 +39,80 @@ std::optional<std::string> take_quoted(std::string_view& rest) {
       field += rest[i++];
     } else {
       rest.remove_prefix(i + 1);
-      return field;
+      return true;
     }
   }
-  return std::nullopt;
+  return false;
 }
 
-std::optional<std::vector<std::string>> split_blanks(std::string_view line) {
-  std::vector<std::string> fields;
+/// Fields of one row after the other, in the memory of those before; false if a line is none.
+using Fields = std::vector<std::string>;
+
+bool split_blanks(std::string_view line, Fields& fields) {
+  fields.clear();
   while (!(line = trimmed(line)).empty()) {
-    const std::size_t end = std::min(line.find_first_of(kBlanks), line.size());
+    const auto end = static_cast<std::size_t>(std::ranges::find_if(line, is_blank) - line.begin());
     fields.emplace_back(line.substr(0, end));
     line.remove_prefix(end);
   }
-  return fields;
+  return true;
+}
+
+bool split_separated(std::string_view line, char separator, Fields& fields) {
+  for (std::size_t count = 1;; ++count) {
+    if (fields.size() < count) fields.emplace_back();
+    std::string& field = fields[count - 1];
+    if (!line.empty() && line.front() == '"') {
+      if (!take_quoted(line, field) || (!line.empty() && line.front() != separator)) return false;
+    } else {
+      const std::size_t end = std::min(line.find(separator), line.size());
+      field = trimmed(line.substr(0, end));
+      line.remove_prefix(end);
+    }
+    if (line.empty()) {
+      fields.resize(count);
+      return true;
+    }
+    line.remove_prefix(1);
+  }
 }
 
 /// A row with the header's number of fields, a trailing empty one taken off; otherwise the problem goes into the table.
-void take_row(Table& table, std::size_t number, std::optional<std::vector<std::string>> fields, const TakeRow& take) {
-  if (!fields) {
-    table.problems.push_back({number, "a quoted field is not closed; line skipped"});
-    return;
+void take_row(Table& table, TableRow& row, const TakeRow& take) {
+  if (row.fields.size() == table.header.size() + 1 && row.fields.back().empty()) row.fields.pop_back();
+  if (row.fields.size() != table.header.size()) {
+    table.problems.push_back({row.line, fmt::format("{} fields where the header has {}; line skipped",
+                                                    row.fields.size(), table.header.size())});
+  } else if (take) {
+    take(table, row);
+  } else {
+    table.rows.push_back(std::move(row));
   }
-  if (fields->size() == table.header.size() + 1 && fields->back().empty()) fields->pop_back();
-  if (fields->size() != table.header.size()) {
-    table.problems.push_back(
-        {number, fmt::format("{} fields where the header has {}; line skipped", fields->size(), table.header.size())});
-    return;
-  }
-  if (take) return take(table, {number, std::move(*fields)});
-  table.rows.push_back({number, std::move(*fields)});
 }
 
 Table read_table(std::string_view text, std::string path, const auto& split, const TakeRow& take = {}) {
   Table table;
   table.path = std::move(path);
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  TableRow row;
   for (std::size_t number = 1; !text.empty(); ++number) {
     const std::string_view line = next_line(text);
     if (trimmed(line).empty()) continue;
-    auto fields = split(line);
+    row.line = number;
+    const bool closed = split(line, row.fields);
     if (table.header_line != 0) {
-      take_row(table, number, std::move(fields), take);
+      if (closed)
+        take_row(table, row, take);
+      else
+        table.problems.push_back({number, "a quoted field is not closed; line skipped"});
       continue;
     }
     table.header_line = number;
-    if (!fields) {
+    if (!closed) {
       table.problems.push_back({number, "a quoted field of the header is not closed"});
       return table;
     }
-    table.header = std::move(*fields);
+    table.header = row.fields;
     if (table.header.size() > 1 && table.header.back().empty()) table.header.pop_back();
   }
   return table;
@@ -117,27 +142,15 @@ std::size_t Table::column(std::string_view name) const {
 }
 
 std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator) {
-  std::vector<std::string> fields;
-  fields.reserve(static_cast<std::size_t>(std::ranges::count(line, separator)) + 1);
-  for (;;) {
-    if (!line.empty() && line.front() == '"') {
-      auto field = take_quoted(line);
-      if (!field || (!line.empty() && line.front() != separator)) return std::nullopt;
-      fields.push_back(std::move(*field));
-    } else {
-      const std::size_t end = std::min(line.find(separator), line.size());
-      fields.emplace_back(trimmed(line.substr(0, end)));
-      line.remove_prefix(end);
-    }
-    if (line.empty()) return fields;
-    line.remove_prefix(1);
-  }
+  Fields fields;
+  return split_separated(line, separator, fields) ? std::optional(std::move(fields)) : std::nullopt;
 }
 
 Table read_csv(std::string_view text, std::string path, char separator, const TakeRow& take) {
   if (separator == 0) separator = likely_separator(text);
   return read_table(
-      text, std::move(path), [separator](std::string_view line) { return split_csv_line(line, separator); }, take);
+      text, std::move(path),
+      [separator](std::string_view line, Fields& fields) { return split_separated(line, separator, fields); }, take);
 }
 
 Table read_blank_separated(std::string_view text, std::string path) {

@@ -121,7 +121,7 @@ const char* kphi_refusal_text(int refusal) {
       "the body must have 3 to 12 corners, finite, counter-clockwise and convex",
       "the law is neither KPHI_LAW_CLAMPED nor KPHI_LAW_PUBLISHED",
       "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE"};
-  if (refusal >= kBadLine && refusal <= kBadOverlap) return kMore[refusal - kBadLine];
+  if (refusal >= kBadLine && refusal < kBadLine + static_cast<int>(std::size(kMore))) return kMore[refusal - kBadLine];
   const bool known = refusal >= 0 && refusal <= static_cast<int>(Refusal::overlap);
   return known ? describe(static_cast<Refusal>(refusal)) : "unknown refusal";
 }

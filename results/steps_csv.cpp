@@ -228,6 +228,7 @@ std::string format_steps(std::span<const StepMean> steps) {
 std::vector<StepMean> parse_steps(std::string_view text, const std::string& name) {
   std::size_t line = 1;
   std::vector<StepMean> steps;
+  steps.reserve(text.size() / 256);  // a row takes twice that
   std::optional<Columns> columns;
   const auto follow = [&](const Table& table) {
     // The reader of tables goes on without such a line; here it is a fault.

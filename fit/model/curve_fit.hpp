@@ -112,6 +112,8 @@ class CurveModel {
                                                                std::span<const CurvePoint> all) const = 0;
   /// k(φ) = Σ basis · value over the parameters.
   [[nodiscard]] virtual std::vector<double> basis(const CurveFit& fit, double phi_deg) const = 0;
+  /// From this φ on the curve lies between what carries it; below it is extrapolated.
+  [[nodiscard]] virtual double first_fitted_deg(const CurveFit& fit) const = 0;
   /// The smallest φ where the curve falls to `k`; nullopt if it does not.
   [[nodiscard]] virtual std::optional<double> falls_to(const CurveFit& fit, double k) const = 0;
   /// Whether the form describes the points that carry it; `freedom` of the variance behind their errors.

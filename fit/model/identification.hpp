@@ -76,7 +76,7 @@ struct Identification {
   /// Thrust coefficient measured at φ = 0, N/(rad/s)².
   [[nodiscard]] Estimate thrust_coefficient() const { return {curve_fit.K_T, curve_fit.K_T_standard_error}; }
   /// From this φ on the curve that flies lies between points that carry it.
-  [[nodiscard]] double first_fitted_deg() const { return curve_fit.anchored ? 0 : curve_fit.points.front().phi_deg; }
+  [[nodiscard]] double first_fitted_deg() const { return curve_fit.model().first_fitted_deg(curve_fit); }
   /// The curve that flies, valid up to the widest occlusion measured.
   [[nodiscard]] compensation::ThrustCurve curve() const {
     return curve_fit.curve(table.back().phi_deg, options.overlap);

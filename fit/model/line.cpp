@@ -79,6 +79,10 @@ class LineModel final : public CurveModel {
             {"slope_per_deg", "slope", "/deg", found.back(), std::move(slope)}};
   }
 
+  double first_fitted_deg(const CurveFit& line) const override {
+    return line.anchored ? 0 : line.points.front().phi_deg;
+  }
+
   std::optional<double> falls_to(const CurveFit& line, double k) const override {
     const double slope = line.value("slope_per_deg");
     return slope < 0 ? std::optional((k - line.k_at(0)) / slope) : std::nullopt;
