@@ -47,12 +47,14 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
     tasks.emplace_back([&run](auto& cell) { return reduce(results::read_run(run, cell), cell); });
   }
   std::atomic<std::size_t> next = 0;
-  std::vector<std::jthread> threads;
-  for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i)
-    threads.emplace_back([&] {
-      results::LoadCellColumns cell;
-      for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task](cell);
-    });
+  const auto work = [&] {
+    results::LoadCellColumns cell;
+    for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task](cell);
+  };
+  std::vector<std::jthread> others;
+  for (std::size_t i = 1; i < std::min<std::size_t>(std::thread::hardware_concurrency(), tasks.size()); ++i)
+    others.emplace_back(work);
+  work();
   std::vector<StepMean> steps;
   for (auto& task : tasks) {
     const std::vector<StepMean> of_run = task.get_future().get();

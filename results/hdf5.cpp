@@ -285,12 +285,19 @@ void Column::write_chunk() {
 
 void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
 
+/// No chunk cache: rows go from the file to the caller's memory at once.
+hid_t without_cache() {
+  static const Handle access = [] {
+    Handle list = own(H5Pcreate(H5P_DATASET_ACCESS), "HDF5");
+    check(H5Pset_chunk_cache(list.get(), 1, 0, 1.0), "HDF5");
+    return list;
+  }();
+  return access.get();
+}
+
 ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file)
     : doing_(fmt::format("{}: read {}", file, name)), type_(type_of(stored)), row_bytes_(bytes_of(stored)) {
-  const Handle access = own(H5Pcreate(H5P_DATASET_ACCESS), doing_);
-  // No chunk cache: rows go from the file to the caller's memory at once.
-  check(H5Pset_chunk_cache(access.get(), 1, 0, 1.0), doing_);
-  dataset_ = own(H5Dopen2(group.get(), name, access.get()), doing_);
+  dataset_ = own(H5Dopen2(group.get(), name, without_cache()), doing_);
   space_ = own(H5Dget_space(dataset_.get()), doing_);
   const int rank = H5Sget_simple_extent_ndims(space_.get());
   if (rank < 1 || rank > 2) throw RecordError(doing_ + ": not one- or two-dimensional");

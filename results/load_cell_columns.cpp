@@ -19,6 +19,18 @@ Four four(const std::int32_t* from) {
   return numbers;
 }
 
+bool any(Four numbers) { return (numbers[0] | numbers[1] | numbers[2] | numbers[3]) != 0; }
+
+/// At least as large as every |count| - 1: their bits, or-ed.
+struct Largest {
+  void add(const Counts& counts) {
+    const Four a = four(&counts[0]), b = four(&counts[2]);
+    first |= a ^ (a >> 31);
+    last |= b ^ (b >> 31);
+  }
+  Four first{}, last{};
+};
+
 /// The ends of the six ranges.
 struct Limits {
   explicit Limits(const LoadCellScale& scale) {
@@ -31,15 +43,17 @@ struct Limits {
     first = four(&counts[0]) - 1;
     last = four(&counts[2]) - 1;
   }
-  /// Which of the counts are at an end.
-  [[nodiscard]] Four reached(const Counts& counts) const {
+  /// Whether one of the counts is at an end.
+  [[nodiscard]] bool reached(const Counts& counts) const {
     const Four a = four(&counts[0]), b = four(&counts[2]);
-    return (a > first) | (a < -first) | (b > last) | (b < -last);
+    return any((a > first) | (a < -first) | (b > last) | (b < -last));
+  }
+  /// Quicker, of many counts: false if none is at an end.
+  [[nodiscard]] bool may_be_reached(const Largest& largest) const {
+    return any((largest.first >= first) | (largest.last >= last));
   }
   Four first, last;  // the largest counts inside
 };
-
-bool any(Four numbers) { return (numbers[0] | numbers[1] | numbers[2] | numbers[3]) != 0; }
 
 }  // namespace
 
@@ -70,12 +84,12 @@ void LoadCellColumns::take(std::size_t first, std::span<const Counts> counts, st
                            std::span<const Nanoseconds> arrival_ns, const RunHeader& header) {
   const Limits limits(header.load_cell);
   const auto axis = static_cast<std::size_t>(std::clamp(header.thrust_axis, 0, 2));
-  Four reached{};
+  Largest largest;
   std::uint32_t bits = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
     force[first + i] = counts[i][axis];
     torque[first + i] = counts[i][axis + 3];
-    reached |= limits.reached(counts[i]);
+    largest.add(counts[i]);
     bits |= status[i];
   }
   for (std::size_t i = 0; i < counts.size();) {
@@ -84,10 +98,9 @@ void LoadCellColumns::take(std::size_t first, std::span<const Counts> counts, st
     while (i < counts.size() && arrival_ns[i] == arrival) ++i;
     datagrams.back().end = first + i;
   }
-  if (bits == 0 && !any(reached)) return;
+  if (bits == 0 && !limits.may_be_reached(largest)) return;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    const Mark mark{first + i, status[i] == (kSummaryBit | kMonitorBit) ? 0u : status[i],
-                    any(limits.reached(counts[i]))};
+    const Mark mark{first + i, status[i] == (kSummaryBit | kMonitorBit) ? 0u : status[i], limits.reached(counts[i])};
     if (mark.status != 0 || mark.at_limit) marks.push_back(mark);
   }
 }

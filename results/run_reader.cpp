@@ -292,6 +292,7 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
       cell.take(at, counts, status, arrival_ns, run.header);
     }
     if (!ended) run.account = account_of(cell.ft_sequence, run.header.load_cell.ft_stride, std::identity());
+    one_at_a_time.lock();  // closing asks HDF5, too
     return run;
   });
 }

@@ -41,7 +41,9 @@ void refine(const Matrix& design, const Upper& upper, const Vector& y, Vector& b
     const Vector residual = y - design * beta;
     Vector gradient(design.cols());
     for (Eigen::Index j = 0; j < design.cols(); ++j) gradient[j] = accurate_dot(design.col(j), residual);
-    beta += upper.solve(upper.transpose().solve(gradient));
+    const Vector change = upper.solve(upper.transpose().solve(gradient));
+    beta += change;
+    if (change.norm() < 1e-17L * beta.norm()) break;
   }
 }
 

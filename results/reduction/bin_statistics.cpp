@@ -72,23 +72,22 @@ constexpr int kOneWay = 20;
 /// Least-squares line through the values that are not NaN, x in places from the first.
 struct Line {
   explicit Line(std::span<const double> values) {
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      if (std::isnan(values[i])) continue;
-      x.push_back(static_cast<double>(i));
-      y.push_back(values[i]);
-    }
-    middle = kphi::mean(x);
-    mean = kphi::mean(y);
+    const auto for_each = [&](auto&& take) {
+      for (std::size_t i = 0; i < values.size(); ++i)
+        if (!std::isnan(values[i])) take(static_cast<double>(i), values[i]);
+    };
+    for_each([&](double x, double y) { ++n, middle += x, mean += y; });
+    middle /= n, mean /= n;
     double product = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      product += (x[i] - middle) * y[i];
-      spread += (x[i] - middle) * (x[i] - middle);
-    }
+    for_each([&](double x, double y) {
+      product += (x - middle) * y;
+      spread += (x - middle) * (x - middle);
+    });
     if (spread > 0) slope = product / spread;
   }
   [[nodiscard]] double at(double place) const { return mean + slope * (place - middle); }
 
-  std::vector<double> x, y;
+  double n = 0;                 ///< of values
   double middle = 0, mean = 0;  ///< NaN without values
   double spread = 0, slope = 0;
 };
@@ -120,7 +119,7 @@ int rising_pairs(std::span<const double> values) {
   for (std::size_t part = 0; part < kBlocks; ++part) {
     const std::size_t begin = values.size() * part / kBlocks, end = values.size() * (part + 1) / kBlocks;
     const Line line(values.subspan(begin, end - begin));
-    if (!line.y.empty()) means.push_back(line.mean);
+    if (line.n > 0) means.push_back(line.mean);
   }
   int pairs = 0;
   for (std::size_t i = 0; i < means.size(); ++i) {

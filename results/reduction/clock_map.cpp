@@ -56,6 +56,16 @@ ClockMap::ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span
   const auto& datagrams = cell.datagrams;
   // Signed difference: the wrap of the 32-bit counter goes forward, a restart of the box back.
   const auto counts_on = [&](std::size_t i) { return static_cast<std::int32_t>(ft_[i] - ft_[i - 1]) > 0; };
+  // Of many at once: no difference is 0 or negative.
+  constexpr std::size_t kBlock = 64;
+  const auto block_counts_on = [&](std::size_t first) {
+    std::uint32_t signs = 0;
+    for (std::size_t i = first; i < first + kBlock; ++i) {
+      const std::uint32_t advance = ft_[i] - ft_[i - 1];
+      signs |= advance | (advance - 1);
+    }
+    return static_cast<std::int32_t>(signs) >= 0;
+  };
   std::vector<std::size_t> broken;  // the first record that arrived at or after the end of each stall
   for (const StreamEvent& event : events) {
     if (event.kind != EventKind::stall_ended) continue;
@@ -68,6 +78,7 @@ ClockMap::ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span
     const std::size_t last = next_break == broken.end() ? ft_.size() : *next_break;
     ClockEpoch epoch{begin, begin + 1, ft_[begin]};
     epoch.rebooted = begin > 0 && !counts_on(begin);
+    while (epoch.end + kBlock <= last && block_counts_on(epoch.end)) epoch.end += kBlock;
     while (epoch.end < last && counts_on(epoch.end)) ++epoch.end;
     DelayFloor floor;
     const Nanoseconds first_ns = datagram->arrival_ns;
