@@ -196,13 +196,13 @@ ExitCode run(const RunOptions& options) {
   if (destination.finished) return print_finished(destination, options.json);
   // A resumption asks only for the missing runs: the operator reports missing answers.
   if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan.mounting_angles());
+  const SignalWatch signals;  // before the words that promise it
   announce(request, dry);
   live::LiveSession view(options.live, live::subject_of(campaign, config));
   put(stderr, live_greeting(view));
   const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
   const auto operator_ = person(options, answers, config, stop_asked);
   clear_safety_stop(destination, *operator_, answers);
-  const SignalWatch signals;
   const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
   summarise(result, destination.folder->path().string(), options.json);
   operator_->finish();
