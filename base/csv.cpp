@@ -45,9 +45,9 @@ bool take_quoted(std::string_view& rest, std::string& field) {
   return false;
 }
 
-/// Fields of one row after the other, in the memory of those before; false if a line is none.
 using Fields = std::vector<std::string>;
 
+/// The fields of the line, in the memory of those of the line before.
 bool split_blanks(std::string_view line, Fields& fields) {
   fields.clear();
   while (!(line = trimmed(line)).empty()) {
@@ -58,6 +58,7 @@ bool split_blanks(std::string_view line, Fields& fields) {
   return true;
 }
 
+/// The same; false if its quotes do not close, or text follows a closing quote.
 bool split_separated(std::string_view line, char separator, Fields& fields) {
   for (std::size_t count = 1;; ++count) {
     if (fields.size() < count) fields.emplace_back();
@@ -86,7 +87,7 @@ void take_row(Table& table, TableRow& row, const TakeRow& take) {
   } else if (take) {
     take(table, row);
   } else {
-    table.rows.push_back(std::move(row));
+    table.rows.push_back(row);
   }
 }
 

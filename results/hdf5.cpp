@@ -128,6 +128,16 @@ std::string described(const ColumnLayout& column) {
   return list.empty() ? column.long_name : list;
 }
 
+/// No chunk cache: rows go from the file to the caller's memory at once.
+hid_t without_cache() {
+  static const Handle access = [] {
+    Handle list = own(H5Pcreate(H5P_DATASET_ACCESS), "HDF5");
+    check(H5Pset_chunk_cache(list.get(), 1, 0, 1.0), "HDF5");
+    return list;
+  }();
+  return access.get();
+}
+
 }  // namespace
 
 Handle::~Handle() {
@@ -284,16 +294,6 @@ void Column::write_chunk() {
 }
 
 void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
-
-/// No chunk cache: rows go from the file to the caller's memory at once.
-hid_t without_cache() {
-  static const Handle access = [] {
-    Handle list = own(H5Pcreate(H5P_DATASET_ACCESS), "HDF5");
-    check(H5Pset_chunk_cache(list.get(), 1, 0, 1.0), "HDF5");
-    return list;
-  }();
-  return access.get();
-}
 
 ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file)
     : doing_(fmt::format("{}: read {}", file, name)), type_(type_of(stored)), row_bytes_(bytes_of(stored)) {

@@ -11,9 +11,12 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstring>
 #include <functional>
+#include <mutex>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -60,12 +63,11 @@ class FakeWeb {
 
   explicit FakeWeb(Manner manner) : manner_(std::move(manner)), socket_(SOCK_STREAM) {
     if (listen(socket_.descriptor(), 8) != 0) throw std::runtime_error("listen");
-    thread_ = std::thread([this] { serve(); });
+    thread_ = std::jthread([this](const std::stop_token& end) { serve(end); });
   }
   ~FakeWeb() {
-    ending_ = true;
+    thread_.request_stop();
     shutdown(socket_.descriptor(), SHUT_RDWR);
-    thread_.join();
   }
   std::uint16_t port() const { return socket_.port(); }
   /// First line and headers of the last request.
@@ -77,15 +79,15 @@ class FakeWeb {
   }
 
  private:
-  void serve() {
-    while (!ending_) {
+  void serve(const std::stop_token& end) {
+    while (!end.stop_requested()) {
       const int client = accept(socket_.descriptor(), nullptr, nullptr);
       if (client < 0) return;
-      answer(client);
+      answer(client, end);
       close(client);
     }
   }
-  void answer(int client) {
+  void answer(int client, const std::stop_token& end) {
     std::string request;
     char bytes[1024];
     while (request.find("\r\n\r\n") == std::string::npos) {
@@ -96,24 +98,25 @@ class FakeWeb {
     last_request_ = request;
     if (manner_.answer) manner_.pieces = {manner_.answer(request)};
     for (const std::string& piece : manner_.pieces) {
-      pause(manner_.before_each);
+      pause(manner_.before_each, end);
       if (send(client, piece.data(), piece.size(), MSG_NOSIGNAL) < 0) return;
     }
     shutdown(client, manner_.keep_open ? SHUT_RD : SHUT_WR);
-    while (manner_.keep_open && !ending_) pause(std::chrono::milliseconds(2));
-    while (!manner_.keep_open && !ending_ && recv(client, bytes, sizeof bytes, 0) > 0) {
+    if (manner_.keep_open) pause(std::chrono::hours(1), end);
+    while (!manner_.keep_open && !end.stop_requested() && recv(client, bytes, sizeof bytes, 0) > 0) {
     }
   }
-  /// In slices of 1 ms, so that the end of a test does not wait for a slow page.
-  void pause(std::chrono::milliseconds duration) const {
-    for (; duration.count() > 0 && !ending_; duration -= std::chrono::milliseconds(1)) usleep(1000);
+  /// A box that answers late; the end of a test does not wait for it.
+  static void pause(std::chrono::milliseconds duration, const std::stop_token& end) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait_for(lock, end, duration, [] { return false; });
   }
 
   Manner manner_;
   LoopbackSocket socket_;
-  std::atomic<bool> ending_{false};
   std::string last_request_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 /// Streams on request, at its rate, to whoever asked last. Counts what it was told.

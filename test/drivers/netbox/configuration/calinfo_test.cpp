@@ -42,7 +42,7 @@ class FakeTcp {
       request = bytes;
       for (const test::Bytes& piece : pieces_) {
         send(client, piece.data(), piece.size(), MSG_NOSIGNAL);
-        usleep(2000);  // so that the pieces travel apart
+        usleep(2000);  // parts the pieces on their way: when the reader has taken one cannot be seen from here
       }
     }
   }
