@@ -81,9 +81,9 @@ function drawSteps() {
   const paints = angles.map((_, i) => occlusionColours()[i % 8]);
   const rows = steps.map(step => [step.speed2_rad2_s2 / 1e6,
     ...angles.map(angle => angle === step.occlusion_deg ? 1e6 * step.k_n_s2 : null)]);
-  // Points with a large uncertainty do not set the scale.
-  const sure = steps.filter(step => step.u_k_n_s2 !== null && step.u_k_n_s2 < 0.05 * Math.abs(step.k_n_s2));
-  const shown = sure.length ? sure : steps, u = step => step.u_k_n_s2 || 0;
+  // Below a third of the highest speed noise hides the thrust: such points do not set the scale.
+  const fastest = steps[steps.length - 1].speed2_rad2_s2, u = step => step.u_k_n_s2 || 0;
+  const shown = steps.filter(step => step.speed2_rad2_s2 >= fastest / 9);
   const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
   const high = 1e6 * Math.max(...shown.map(step => step.k_n_s2 + u(step)));
   const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
