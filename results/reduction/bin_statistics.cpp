@@ -76,6 +76,7 @@ struct Line {
       for (std::size_t i = 0; i < values.size(); ++i)
         if (!std::isnan(values[i])) take(static_cast<double>(i), values[i]);
     };
+    double n = 0;
     for_each([&](double x, double y) { ++n, middle += x, mean += y; });
     middle /= n, mean /= n;
     double product = 0;
@@ -87,7 +88,6 @@ struct Line {
   }
   [[nodiscard]] double at(double place) const { return mean + slope * (place - middle); }
 
-  double n = 0;                 ///< of values
   double middle = 0, mean = 0;  ///< NaN without values
   double spread = 0, slope = 0;
 };
@@ -118,8 +118,7 @@ int rising_pairs(std::span<const double> values) {
   std::vector<double> means;
   for (std::size_t part = 0; part < kBlocks; ++part) {
     const std::size_t begin = values.size() * part / kBlocks, end = values.size() * (part + 1) / kBlocks;
-    const Line line(values.subspan(begin, end - begin));
-    if (line.n > 0) means.push_back(line.mean);
+    means.push_back(Line(values.subspan(begin, end - begin)).mean);  // NaN is neither larger nor smaller
   }
   int pairs = 0;
   for (std::size_t i = 0; i < means.size(); ++i) {
