@@ -36,14 +36,17 @@ http::response<http::string_body> read_response(TcpClient& box) {
   http::response_parser<http::string_body> parser;
   parser.header_limit(kHeadLimit);
   parser.body_limit(kBodyLimit);
-  parser.eager(true);
   std::string received;
   while (!parser.is_done()) {
     boost::system::error_code error;
     if (box.receive(received)) {
       // The parser would wait for the end of whatever this is.
       if (!parser.got_some() && !kScheme.starts_with(received.substr(0, kScheme.size()))) throw kNotHttp;
-      received.erase(0, parser.put(boost::asio::buffer(received), error));
+      do {
+        // Before the header is done: an eager parser goes past a length above the limit, and makes room for all of it.
+        parser.eager(parser.is_header_done());
+        received.erase(0, parser.put(boost::asio::buffer(received), error));
+      } while (!error && !received.empty() && !parser.is_done());
     } else {
       if (!parser.got_some()) throw kCutShort;
       parser.put_eof(error);

@@ -55,6 +55,7 @@ TEST(HttpGet, WhatIsNoWholeAnswerIsNamed) {
            {{{cut}}, "could not read the answer: the connection ended early"},
            {{}, "could not read the answer: the connection ended early"},
            {{{cut}, 0ms, true}, "no answer within"},
+           {{{"HTTP/1.0 200 OK\r\nContent-Length: 9999999999999999\r\n\r\nabc"}}, "the answer is longer than 1 MiB"},
            {{{"SSH-2.0-OpenSSH_9.2\r\n\r\n"}}, "not a Net Box"}}) {
     const FakeWeb web(manner);
     EXPECT_THAT(failure(web.port(), manner.keep_open ? 50ms : 10s), HasSubstr(words));
