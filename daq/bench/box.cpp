@@ -8,15 +8,12 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
+#include "daq/bench/device_records.hpp"
 
 namespace kphi::daq {
 namespace {
 
 constexpr int kSlots = 16;
-
-StreamEvent event_of(EventKind kind, Instant at, const std::string& what) {
-  return {kind, at.count(), 0, fmt::format("{:.3f} s: {}", to_seconds(at), what)};
-}
 
 constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
@@ -61,11 +58,11 @@ std::optional<StreamEvent> configuration_event(const netbox::Configuration& befo
       kind = EventKind::unusable;
       const netbox::Changes changes = changes_since(before, netbox::parse_configuration(xml), biased);
       if (changes == 0) return std::nullopt;
-      return event_of(EventKind::configuration_changed, now(),
+      return event_at(now(), EventKind::configuration_changed,
                       "configuration changed since the run began: " + netbox::to_words(changes) +
                           "; all steps of this run are flagged");
     } catch (const DeviceError& error) {
-      failure = event_of(kind, now(), std::string("configuration not verified after the run: ") + error.what());
+      failure = event_at(now(), kind, std::string("configuration not verified after the run: ") + error.what());
     }
   }
   return failure;

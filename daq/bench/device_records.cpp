@@ -26,6 +26,10 @@ results::LoadCellScale to_scale(const netbox::Configuration& configuration) {
   return scale;
 }
 
+StreamEvent event_at(Instant at, EventKind kind, const std::string& what, std::uint64_t records) {
+  return {kind, at.count(), records, fmt::format("{:.3f} s: {}", to_seconds(at), what)};
+}
+
 std::vector<StreamEvent> to_events(const std::vector<netbox::Event>& events) {
   std::vector<StreamEvent> out;
   for (const netbox::Event& event : events) {
@@ -38,7 +42,7 @@ std::vector<StreamEvent> to_events(const std::vector<netbox::Event>& events) {
 
 std::vector<StreamEvent> to_events(std::vector<StreamEvent> events_of_motor) {
   for (StreamEvent& event : events_of_motor)
-    event.text = fmt::format("{:.3f} s: {}", to_seconds(Instant(event.time_ns)), event.text);
+    event = event_at(Instant(event.time_ns), event.kind, event.text, event.records);
   return events_of_motor;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 
 namespace kphi::daq {
@@ -244,11 +245,10 @@ std::optional<StreamEvent> Guard::event() const {
   if (trip == nullptr) return std::nullopt;
   const bool of_supply = trip->watched == Watched::state && trip->source == Source::supply;
   const std::string where = trip->step < 0 ? "" : fmt::format("step {}: ", trip->step + 1);
-  return StreamEvent{is_load_cell_axis(trip->watched) ? EventKind::range_trip
-                     : of_supply                      ? EventKind::supply_stop
-                                                      : EventKind::guard_trip,
-                     trip->noticed.count(), 0,
-                     fmt::format("{:.3f} s: {}{}", to_seconds(trip->noticed), where, trip->reason)};
+  const EventKind kind = is_load_cell_axis(trip->watched) ? EventKind::range_trip
+                         : of_supply                      ? EventKind::supply_stop
+                                                          : EventKind::guard_trip;
+  return event_at(trip->noticed, kind, where + trip->reason);
 }
 
 }  // namespace kphi::daq

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "daq/bench/device_records.hpp"
+
 namespace kphi::daq {
 namespace {
 
@@ -23,8 +25,6 @@ const char* next_move(StatusVerdict verdict) {
   if (verdict == StatusVerdict::communication) return "check the box's network and field bus, then run: kphi devices";
   return "check the cell's cable and the box's supply, switch the box off and on, then run: kphi devices";
 }
-
-double seconds(Nanoseconds at) { return 1e-9 * static_cast<double>(at); }
 
 }  // namespace
 
@@ -80,15 +80,15 @@ std::string StatusWatch::reason() const {
 
 void StatusWatch::note_error(const LoadCellRecord& sample) {
   told_ = episode_.told = true;
-  event_ = {EventKind::box_error, sample.arrival_ns, 0,
-            fmt::format("{:.3f} s: {}", seconds(sample.arrival_ns), error())};
+  event_ = event_at(sample.arrival(), EventKind::box_error, error());
 }
 
 void StatusWatch::note_end() {
   if (!episode_.told) return;
-  event_ = {EventKind::box_error_ended, episode_.sound_since, episode_.bad,
-            fmt::format("{:.3f} s: the {} no longer reports an error, after {} bad samples",
-                        seconds(episode_.sound_since), netbox::name_of(product_), episode_.bad)};
+  event_ = event_at(
+      Instant(episode_.sound_since), EventKind::box_error_ended,
+      fmt::format("the {} no longer reports an error, after {} bad samples", netbox::name_of(product_), episode_.bad),
+      episode_.bad);
 }
 
 }  // namespace kphi::daq

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "daq/bench/device_records.hpp"
 #include "daq/guard/guard_limits.hpp"
 
 namespace kphi::daq {
@@ -71,9 +72,9 @@ void Recorder::note_range(netbox::RangeVerdict verdict, Nanoseconds at) {
   worst_ = verdict;
   const auto axis = static_cast<std::size_t>(range_.worst_axis());
   const GuardedQuantity& row = row_of(static_cast<Watched>(axis));
-  note({verdict == netbox::RangeVerdict::near ? EventKind::near_range : EventKind::beyond_range, at, 0,
-        fmt::format("{:.3f} s: {} carries {:.0f} % of its range of {:g} {}", 1e-9 * static_cast<double>(at), row.name,
-                    100 * range_.largest_load(), scale_.range[axis], row.unit)});
+  note(event_at(Instant(at), verdict == netbox::RangeVerdict::near ? EventKind::near_range : EventKind::beyond_range,
+                fmt::format("{} carries {:.0f} % of its range of {:g} {}", row.name, 100 * range_.largest_load(),
+                            scale_.range[axis], row.unit)));
 }
 
 template <class T>

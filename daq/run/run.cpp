@@ -61,19 +61,8 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   return header;
 }
 
-/// Streams while it lives.
-class Streaming {
- public:
-  explicit Streaming(LoadCellLink& cell) : cell_(cell), scale_(cell.start()) {}
-  ~Streaming() { cell_.stop(); }
-  Streaming(const Streaming&) = delete;
-  Streaming& operator=(const Streaming&) = delete;
-  [[nodiscard]] const results::LoadCellScale& scale() const { return scale_; }
-
- private:
-  LoadCellLink& cell_;
-  results::LoadCellScale scale_;
-};
+/// The load cell streams while it lives.
+using Streaming = std::unique_ptr<LoadCellLink, decltype([](LoadCellLink* cell) { cell->stop(); })>;
 
 /// Checks a box whose settings changed since they were last read against the campaign. Throws ConfigurationError.
 void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell, const RunOrder& order,
@@ -191,13 +180,14 @@ std::string utc_text(const Clock& clock, Instant when) {
 RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
   const netbox::Configuration before = bench.load_cell().configuration();
   const results::MotorCounts counts_before = bench.motor().counts();
-  std::optional<Streaming> streaming(std::in_place, bench.load_cell());
+  const results::LoadCellScale scale = bench.load_cell().start();
+  Streaming streaming(&bench.load_cell());
   judge_changes(before, bench.load_cell(), order, progress);
-  results::RunWriter writer(order.file, header_of(order, bench, streaming->scale()), bench.files());
+  results::RunWriter writer(order.file, header_of(order, bench, scale), bench.files());
   const DeviceLimits devices = device_limits(bench);
   const std::vector<GuardLimit> limits = combine_limits(order.campaign, order.config, &devices);
   progress.guarded(limits);
-  Guard guard(bench, order.config, streaming->scale(), limits);
+  Guard guard(bench, order.config, scale, limits);
   Recorder recorder(bench, guard, writer);
   Sequence sequence(bench, recorder, guard, order, progress, stop_asked);
   Ended ended = carry_out(sequence, bench, guard, recorder);

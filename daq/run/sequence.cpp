@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "daq/bench/box.hpp"
+#include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/rest_guard.hpp"
 #include "daq/guard/run_stopped.hpp"
@@ -104,8 +105,7 @@ void Sequence::switch_off(StopWords& words) {
   const Trip* trip = guard_.latch().trip();
   if (trip != nullptr && trip->protection == seen.protection) return;
   const std::string tripped = tripped_words(seen);
-  const std::int64_t at = bench_.clock().now().count();
-  supply_event_ = {EventKind::supply_stop, at, 0, fmt::format("{:.3f} s: {}", 1e-9 * static_cast<double>(at), tripped)};
+  supply_event_ = event_at(bench_.clock().now(), EventKind::supply_stop, tripped);
   words.also(tripped);
 }
 
