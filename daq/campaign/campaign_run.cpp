@@ -8,7 +8,6 @@
 #include <set>
 
 #include "base/error.hpp"
-#include "daq/audit/bench_audit.hpp"
 #include "daq/campaign/campaign_review.hpp"
 #include "daq/campaign/resume.hpp"
 #include "daq/guard/interlock.hpp"

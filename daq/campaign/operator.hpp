@@ -1,7 +1,6 @@
 // The person who mounts occlusions and takes the decisions that a program cannot; or a file with their answers.
 #pragma once
 
-#include <cstddef>
 #include <cstdio>
 #include <functional>
 #include <optional>

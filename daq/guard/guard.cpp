@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "daq/bench/device_records.hpp"
-#include "daq/guard/interlock.hpp"
 
 namespace kphi::daq {
 namespace {

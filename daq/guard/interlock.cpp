@@ -61,8 +61,6 @@ bool Latch::set(Trip trip) noexcept {
   return true;
 }
 
-const Trip* Latch::trip() const noexcept { return state_.load() == State::closed ? &trip_ : nullptr; }
-
 void Latch::check() const {
   if (const Trip* trip = this->trip()) throw SafetyStop(*trip);
 }

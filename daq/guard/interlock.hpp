@@ -35,7 +35,7 @@ class Latch {
   /// True: it was the first.
   bool set(Trip trip) noexcept;
   /// nullptr before the first.
-  [[nodiscard]] const Trip* trip() const noexcept;
+  [[nodiscard]] const Trip* trip() const noexcept { return state_.load() == State::closed ? &trip_ : nullptr; }
   /// Throws SafetyStop with the reason.
   void check() const;
 

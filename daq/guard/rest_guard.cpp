@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 
-#include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "drivers/iq/wire/codes.hpp"
 
@@ -46,8 +45,6 @@ void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
   }
   resting_ = true;
 }
-
-void RestGuard::check() const { latch_.check(); }
 
 void RestGuard::poll() noexcept {
   try {

@@ -30,7 +30,7 @@ class RestGuard {
   /// still turns after 30 s, or if its speed cannot be read; Interrupted if `stop_asked`.
   void await_rest(const std::function<bool()>& stop_asked);
   /// Throws SafetyStop after a trip. Any thread.
-  void check() const;
+  void check() const { latch_.check(); }
 
  private:
   void poll() noexcept;

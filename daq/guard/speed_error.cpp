@@ -41,8 +41,6 @@ void SpeedWatch::command_ramp(Instant at, RadPerSec speed) noexcept {
   high_ = std::max(high_, commanded_);
 }
 
-void SpeedWatch::release() noexcept { *this = SpeedWatch(direction_, host_, share_); }
-
 void SpeedWatch::take(const MotorReading& reading) noexcept {
   if (!watching_ || error_.kind != SpeedError::Kind::none) return;
   const Instant at(reading.time_ns);

@@ -61,7 +61,7 @@ class SpeedWatch {
   /// The command ramps to `speed`: until the next one the rotor may be anywhere between.
   void command_ramp(Instant at, RadPerSec speed) noexcept;
   /// The speed is no longer commanded. Clears the error.
-  void release() noexcept;
+  void release() noexcept { *this = SpeedWatch(direction_, host_, share_); }
   void take(const MotorReading& reading) noexcept;
   /// % of the command by which the newest speed leaves its band, beside kFloor; NaN while no speed is commanded.
   [[nodiscard]] double error_percent() const noexcept;

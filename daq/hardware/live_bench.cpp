@@ -11,7 +11,6 @@
 #include "base/error.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/box.hpp"
-#include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/sleep_inhibitor.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
@@ -91,8 +90,6 @@ std::shared_ptr<iq::Motor> LiveMotor::connected() const {
   throw DeviceError("motor module on " + config_.device, "spin", "the module has no power");
 }
 
-void LiveMotor::rest() { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
-
 void LiveMotor::wake() {
   rest();
   const auto give_up = std::chrono::steady_clock::now() + kBootTime;
@@ -111,8 +108,6 @@ void LiveMotor::wake() {
     return;
   }
 }
-
-void LiveMotor::spin_at(RadPerSec signed_speed) { connected()->spin_at(signed_speed); }
 
 void LiveMotor::renew() noexcept {
   if (const auto motor = this->motor()) motor->renew();

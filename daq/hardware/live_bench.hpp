@@ -22,9 +22,9 @@ class LiveMotor final : public MotorLink {
  public:
   /// Connects and reads the module's parameters. Throws DeviceError.
   LiveMotor(const profiles::MotorConfig& config, const Clock& clock);
-  void rest() override;
+  void rest() override { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
   void wake() override;
-  void spin_at(RadPerSec signed_speed) override;
+  void spin_at(RadPerSec signed_speed) override { connected()->spin_at(signed_speed); }
   void renew() noexcept override;
   void emergency_stop() noexcept override;
   void begin_stop(const iq::StopSettings& settings) override;

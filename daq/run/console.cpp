@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <condition_variable>
 #include <iterator>
-#include <list>
 #include <mutex>
 #include <utility>
 #include <vector>

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 
-#include <utility>
-
 namespace kphi::daq {
 namespace {
 
@@ -56,8 +54,6 @@ std::string describe(const Position& position, const Observation& seen) {
 }
 
 PrintedProgress::~PrintedProgress() { put(stream_, clearing(), Worth::live); }
-
-std::string PrintedProgress::clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
 
 void PrintedProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();

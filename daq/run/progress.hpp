@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "daq/guard/observation.hpp"
@@ -57,7 +58,7 @@ class PrintedProgress final : public Progress {
 
  private:
   /// The text that clears the live line; empty if none is drawn.
-  [[nodiscard]] std::string clearing();
+  [[nodiscard]] std::string clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
   std::FILE* stream_;
   const bool on_terminal_;
   bool drawn_ = false;

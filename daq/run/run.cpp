@@ -5,7 +5,6 @@
 
 #include <boost/uuid/name_generator_sha1.hpp>
 #include <boost/uuid/uuid_io.hpp>
-#include <optional>
 
 #include "base/error.hpp"
 #include "daq/audit/bench_audit.hpp"

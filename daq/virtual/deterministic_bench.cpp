@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <stdexcept>
-#include <utility>
 
 #include "base/error.hpp"
 #include "base/random.hpp"
