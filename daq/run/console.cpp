@@ -42,7 +42,6 @@ bool WordQueue::drop_one() noexcept {
   auto least = std::find_if(first, texts_.end(), [](const Text& text) { return text.worth != Worth::kept; });
   if (least == texts_.end()) {
     least = first;
-    ++lost_;
     ++untold_;
   }
   size_ -= least->bytes.size();
@@ -181,13 +180,6 @@ bool Console::finish(std::chrono::milliseconds limit) noexcept {
 bool Console::is_used() const noexcept {
   const std::lock_guard lock(shared_->mutex);
   return shared_->order > 0;
-}
-
-std::uint64_t Console::lost() const noexcept {
-  const std::lock_guard lock(shared_->mutex);
-  std::uint64_t lost = 0;
-  for (const Shared::Stream& stream : shared_->streams) lost += stream.queue.lost();
-  return lost;
 }
 
 void Console::write_on(const std::shared_ptr<Shared>& shared) noexcept {

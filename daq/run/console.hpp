@@ -38,8 +38,6 @@ class WordQueue {
   void taken(std::size_t n) noexcept;
   /// Drops everything, uncounted.
   void clear() noexcept;
-  /// Kept texts that were dropped.
-  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
   struct Text {
@@ -51,10 +49,9 @@ class WordQueue {
   bool drop_one() noexcept;
 
   std::list<Text> texts_;
-  std::size_t size_ = 0;   ///< bytes of all
-  std::size_t gone_ = 0;   ///< bytes of the oldest that were written
-  bool is_begun_ = false;  ///< the oldest may be partly written
-  std::uint64_t lost_ = 0;
+  std::size_t size_ = 0;      ///< bytes of all
+  std::size_t gone_ = 0;      ///< bytes of the oldest that were written
+  bool is_begun_ = false;     ///< the oldest may be partly written
   std::uint64_t untold_ = 0;  ///< lost texts before the oldest one that the output does not mention yet
 };
 
@@ -75,8 +72,6 @@ class Console {
   bool finish(std::chrono::milliseconds limit) noexcept;
   /// put() was called.
   [[nodiscard]] bool is_used() const noexcept;
-  /// Kept texts that were dropped for lack of room.
-  [[nodiscard]] std::uint64_t lost() const noexcept;
 
  private:
   struct Shared;

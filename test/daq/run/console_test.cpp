@@ -50,7 +50,6 @@ TEST_P(BlockedConsole, KeepsNobodyWaitingAndTheOtherStreamGoing) {
     console.put(to_free_.descriptor, "data\n", Worth::kept);
     EXPECT_LT(steady_clock::now() - begun, 5 * kAtOnce);
     EXPECT_TRUE(test::soon([&] { return free_.read() == "data\n"; }));
-    EXPECT_GT(console.lost(), 2000u) << "there is room for 2600 of them";
     const auto asked = steady_clock::now();
     EXPECT_FALSE(console.finish(100ms));
     EXPECT_LT(steady_clock::now() - asked, 100ms + kAtOnce);
@@ -158,7 +157,6 @@ TEST_F(Words, LeaveInTheirOrder) {
   push("");
   EXPECT_EQ(queue_.order(), 1u);
   EXPECT_EQ(all(), "one\ntwo\nthree, which is longer\n");
-  EXPECT_EQ(queue_.lost(), 0u);
 }
 
 TEST_F(Words, ThatAreLiveGiveWayToTheNextUnlessAnythingStandsBetween) {
@@ -185,14 +183,12 @@ TEST_F(Words, ThatPassGoFirstWhenThereIsNoRoomTheOldestBeforeTheOthers) {
   push(long_text('x', 1).substr(24));
   const std::string text = all(100'000);
   EXPECT_THAT(text, testing::StartsWith("kept first\nnew progress\nxxx"));
-  EXPECT_EQ(queue_.lost(), 0u);
 }
 
 TEST_F(Words, ThatAreLostAreCountedAndTheirPlaceIsTold) {
   push("under way\n");
   (void)queue_.begin(3);
   for (const char letter : {'a', 'b', 'c', 'd', 'e'}) push(long_text(letter, 0.4));
-  EXPECT_EQ(queue_.lost(), 3u);
   const std::string text = all(100'000);
   EXPECT_THAT(text, testing::StartsWith("under way\nkphi: this output was blocked; messages lost here: 3\nddd"));
   EXPECT_THAT(text, testing::EndsWith("e"));
