@@ -204,7 +204,8 @@ try {
 
   await it(`coasts the motor within ${kPrompt_ms} ms of a key`, async () => {
     await turns(page, run, 2);
-    await page.screenshot({ path: path.join(pictures, 'live_view.png') });
+    await page.screenshot({ path: path.join(pictures, 'live_view.png') });  // which may outlast the repetition
+    await turns(page, run, 1 + await page.evaluate(() => window.seen.last.repetition));
     await stopBy('key', () => page.keyboard.press('Escape'), page, bench, run);
     await page.close();
   });
