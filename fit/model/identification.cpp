@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "compensation/units.hpp"
+#include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -76,9 +77,9 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
 }
 
 /// For "k at a speed" only the steps at that speed; otherwise all steps, with the weights of the fit.
-AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
+AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed, double zero_movement_n) {
   if (estimator != Estimator::at_speed) {
-    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
+    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k, zero_movement_n);
     WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
     if (estimator != Estimator::through_origin) {
       // The other terms of the map are fitted too, and their errors are part of the error of k.
@@ -95,7 +96,7 @@ AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, do
     at_level.points[i].weight = there ? 1 / (square * square) : 0;
     at_level.robust_weights[i] = 1;
   }
-  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k), {});
+  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k, zero_movement_n), {});
 }
 
 void require_one_propeller(std::span<const StepMean> steps) {
@@ -175,15 +176,17 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
                                                   double at_speed_rad_s, Repeatability& repeatability) {
   std::vector<OcclusionCoefficient> table;
   std::vector<AngleScatter> scatter;
+  results::ZeroMovement movement;
+  for (const StepMean& step : steps) movement.add(step);
   for (auto& [phi_deg, measured] : by_angle(steps)) {
     try {
       table.push_back(coefficient(phi_deg, measured, options, at_speed_rad_s));
     } catch (const FitError& error) {
       throw FitError(fmt::format("phi = {} deg: {}", phi_deg, error.what()));
     }
-    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s));
+    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s, movement.usual_n()));
   }
-  repeatability = fit::repeatability(std::move(scatter));
+  repeatability = fit::repeatability(std::move(scatter), {movement.usual_n(), 0, movement.runs()});
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
     if (repeatability.repeated) row.standard_error = repeatability.independent_u(i);

@@ -29,9 +29,9 @@ struct WithinRuns {
 };
 
 /// One per repetition, ascending. `fit` was made of `steps`, one point each in the same order; x is its map divided by
-/// `k`.
+/// `k`; `zero_movement_n` the usual one (results::ZeroMovement).
 [[nodiscard]] std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps,
-                                                const ThrustFit& fit, double k);
+                                                const ThrustFit& fit, double k, double zero_movement_n);
 
 /// From the interaction of step and repetition, which contains neither errors of whole runs nor of the map; from the
 /// residuals of a single run. Each step counts by its own scatter (MacKinnon, White 1985), since thrust scatters more
@@ -53,8 +53,9 @@ struct AngleScatter {
 
 struct Repeatability {
   std::vector<AngleScatter> angles;
-  Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  bool repeated = false;  ///< at least one φ was measured more than once; otherwise `between` is unknown
+  Estimate between;          ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
+  bool repeated = false;     ///< at least one φ was measured more than once; otherwise `between` is unknown
+  Estimate zero_movement{};  ///< of a run's zero, usually, N; freedom: the runs behind it
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;
@@ -62,7 +63,7 @@ struct Repeatability {
   [[nodiscard]] double freedom() const;
 };
 
-[[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles);
+[[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& zero_movement = {});
 
 /// A run further from the others of its φ than chance explains. It stays in k and in the scatter of the repetitions.
 struct OutlyingRun {

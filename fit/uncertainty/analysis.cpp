@@ -241,7 +241,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   std::vector<double> phis;
   for (const OcclusionCoefficient& row : identification.table) phis.push_back(row.phi_deg);
   const bool from_steps = !identification.repeatability.angles.empty();
-  if (from_steps) analysis.speed = speed_dependence(identification.table);
+  if (from_steps) analysis.speed = speed_dependence(identification.table, identification.repeatability.zero_movement);
   const ErrorSources sources = sources_of(identification, analysis, options.bench);
   for (std::size_t i = 0; i < phis.size(); ++i)
     analysis.coefficients.push_back(

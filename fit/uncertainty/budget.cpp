@@ -76,7 +76,9 @@ void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
 void add_repeatability(ErrorSources& sources, const Repeatability& all) {
   ErrorSource noise{"noise within runs", Evaluation::type_a, kUnitOfK};
   ErrorSource between{"repetitions", Evaluation::type_a, "1"};
-  ErrorSource zero{"zero", Evaluation::type_b, "N", "of each run: as measured, and half of its drift"};
+  ErrorSource zero{"zero", Evaluation::type_b, "N",
+                   "of each run: as measured, and how far zeros usually move in a run"};
+  zero.shared_freedom = all.zero_movement.value > 0 ? all.zero_movement.freedom : 0;
   between.shared_freedom = all.between.freedom;
   between.note = all.repeated ? "beyond noise and zero, pooled over phi" : "unknown: one run each";
   for (const AngleScatter& angle : all.angles) {

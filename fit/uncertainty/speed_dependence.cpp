@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include "base/error.hpp"
 #include "base/statistics.hpp"
@@ -27,11 +28,12 @@ struct Run {
   double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
 };
 
-std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
+std::vector<Run> runs_of(std::span<const results::StepMean> steps, double zero_movement_n) {
   std::map<int, Run> runs;
-  std::map<int, results::RunZero> zeros;
+  std::map<int, double> zeros;
   for (const results::StepMean& step : steps) {
-    zeros[step.repetition].add(step);
+    double& zero_u = zeros[step.repetition];
+    zero_u = std::fmax(zero_u, step.zero_u_n);  // ignores an unknown one
     if (!(step.speed_rad_s > 0)) continue;
     runs[step.repetition].samples.push_back(
         {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
@@ -41,7 +43,7 @@ std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
     double xt = 0, xx = 0;
     for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
     run.k = xt / xx;
-    if (const double u = zeros[repetition].u_n(); u > 0) run.zero_u_n = u;
+    if (const double u = results::shared_zero_u(zeros[repetition], zero_movement_n); u > 0) run.zero_u_n = u;
     std::ranges::sort(run.samples, {}, &Sample::level);
     result.push_back(std::move(run));
   }
@@ -85,6 +87,9 @@ struct RunModel {
   NoiseModel noise;
   bool zero_is_free = false;
 
+  [[nodiscard]] std::vector<double> row_of(const Sample& sample) const {
+    return {sample.x, 1, k * sample.x * (sample.speed - middle) / spread};
+  }
   /// The trend is the last term. The last residual is that of the zero if its uncertainty is known.
   [[nodiscard]] Regression fit(const std::vector<Sample>& samples, double zero_u_n) const {
     std::vector<std::vector<double>> rows;
@@ -95,13 +100,33 @@ struct RunModel {
       thrusts.push_back(thrust);
       weights.push_back(1 / variance);
     };
-    for (const Sample& sample : samples)
-      add({sample.x, 1, k * sample.x * (sample.speed - middle) / spread}, sample.thrust, noise.at(sample.x));
+    for (const Sample& sample : samples) add(row_of(sample), sample.thrust, noise.at(sample.x));
     if (!zero_is_free) add({0, 1, 0}, 0, zero_u_n * zero_u_n);
     if (rows.size() <= (spread > 0 ? 3 : 2)) throw FitError("k against speed: too few steps in a run");
     return regress(rows, thrusts, weights);
   }
 };
+
+/// Variance that a zero wandering within the run adds to its trend; a movement of 1 N is usual. About its mean, which
+/// counts as the zero's own error, a random walk tied at both ends has the covariance 1/12 − d/2 + d²/2, d the time
+/// between two steps as a share of the run (Watson, Biometrika 48 (1961) 109).
+double variance_by_wandering(const RunModel& model, const std::vector<Sample>& samples, const Regression& found) {
+  std::vector<double> influence;  // of the thrust of each step on the trend
+  for (const Sample& sample : samples) {
+    const std::vector<double> row = model.row_of(sample);
+    const auto& covariance = found.covariance.back();
+    influence.push_back(std::inner_product(row.begin(), row.end(), covariance.begin(), 0.0) / model.noise.at(sample.x));
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (std::size_t j = 0; j < samples.size(); ++j) {
+      const double apart =
+          std::abs(static_cast<double>(i) - static_cast<double>(j)) / static_cast<double>(samples.size());
+      sum += influence[i] * influence[j] * (1.0 / 12 - apart / 2 + apart * apart / 2);
+    }
+  }
+  return std::max(0.0, sum);
+}
 
 /// The levels that all runs measured, one column each.
 std::vector<Run> complete_levels(std::vector<Run> runs) {
@@ -161,7 +186,7 @@ void take_residuals(const std::vector<Run>& complete, Angle& angle) {
   }
 }
 
-void take_trends(Angle& angle, double slowest, double fastest) {
+void take_trends(Angle& angle, double slowest, double fastest, const Estimate& zero_movement) {
   RunModel model = angle.model;
   model.middle = 0.5 * (slowest + fastest);
   model.spread = fastest - slowest;
@@ -179,6 +204,11 @@ void take_trends(Angle& angle, double slowest, double fastest) {
     angle.trends.push_back(found.estimates.back());
     squares += found.covariance.back().back();
     angle.alone_freedom = static_cast<double>(found.freedom);
+    if (angle.runs.size() > 1 || model.zero_is_free || !(zero_movement.value > 0)) continue;
+    const double wandering = variance_by_wandering(model, run.samples, found) * std::pow(zero_movement.value, 2);
+    angle.alone_freedom = std::pow(squares + wandering, 2) /
+                          (squares * squares / angle.alone_freedom + wandering * wandering / zero_movement.freedom);
+    squares += wandering;
   }
   angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
 }
@@ -248,7 +278,8 @@ std::vector<SpeedCoefficient> level_coefficients(const std::vector<Run>& runs) {
   return rows;
 }
 
-Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete) {
+Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete,
+              const Estimate& zero_movement) {
   Angle angle;
   angle.model.zero_is_free = std::ranges::any_of(
       runs, [](double u) { return std::isnan(u); }, &Run::zero_u_n);
@@ -258,7 +289,7 @@ Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::ve
       take_noise(complete, angle.model);
       if (angle.model.noise.at(mean_x(complete, 0)) > 0) take_residuals(complete, angle);
     }
-    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s);
+    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s, zero_movement);
   } catch (const FitError&) {
     angle.trends.clear();
   }
@@ -290,18 +321,19 @@ void judge(const Angle& angle, const Estimate& scatter, double share, SpeedDepen
 
 }  // namespace
 
-std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table) {
+std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table,
+                                              const Estimate& zero_movement) {
   std::vector<SpeedDependence> result;
   std::vector<Angle> angles;
   std::vector<std::vector<Run>> complete;
   for (const OcclusionCoefficient& one : table) {
-    std::vector<Run> runs = runs_of(one.measured);
+    std::vector<Run> runs = runs_of(one.measured, zero_movement.value);
     result.push_back({});
     result.back().phi_deg = one.phi_deg;
     result.back().levels = level_coefficients(runs);
     complete.push_back(complete_levels(runs));
     const bool testable = result.back().levels.size() > 2;
-    angles.push_back(testable ? prepare(result.back(), std::move(runs), complete.back()) : Angle{});
+    angles.push_back(testable ? prepare(result.back(), std::move(runs), complete.back(), zero_movement) : Angle{});
   }
   const Estimate scatter = scatter_of_trends(angles);
   const double share = independent_share(angles);
