@@ -89,6 +89,9 @@ IdentificationOptions options_of(const FitRequest& request) {
   options.speed_range = parse_speed_range(request.speed_range_rpm, options.speed_range);
   if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
   for (const std::string& text : request.left_out) options.left_out.push_back(parse_left_out_run(text));
+  BenchUncertainty given;
+  for (const std::string& text : request.uncertainties) set_uncertainty(given, text);
+  options.mounting = given.mounting;
   return options;
 }
 
@@ -271,9 +274,10 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_choice(command, "--overlap", request.options.overlap,
              "how φ is measured in flight, to be the same in the vehicle file",
              {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
-  add_value(command, "--u", "NAME=VALUE", request.uncertainties,
-            "standard uncertainty of calibration, cross-axis, clock, density (all relative) or alignment-deg; may "
-            "be repeated")
+  add_value(
+      command, "--u", "NAME=VALUE", request.uncertainties,
+      "standard uncertainty of calibration, cross-axis, clock, density, mounting (all relative) or alignment-deg; may "
+      "be repeated")
       ->allow_extra_args(false);
   add_value(command, "--leave-out", "PHI:REPETITION:CAUSE", request.left_out,
             "leave out a run for a known cause, which the report names; may be repeated")

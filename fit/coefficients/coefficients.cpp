@@ -259,6 +259,7 @@ RecordedFit read_recorded_fit(const std::string& path) {
   if (!fit.bench) return record;
   record.bench.emplace();
   for (const auto& [name, value] : *fit.bench) set_uncertainty(*record.bench, name + "=" + shortest(value));
+  options.mounting = record.bench->mounting;
   return record;
 }
 

@@ -187,9 +187,13 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
     scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s, movement.usual_n()));
   }
   repeatability = fit::repeatability(std::move(scatter), {movement.usual_n(), 0, movement.runs()});
+  if (options.mounting && !repeatability.repeated) {
+    repeatability.between.u = *options.mounting;
+    repeatability.between_known = true;
+  }
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
-    if (repeatability.repeated) row.standard_error = repeatability.independent_u(i);
+    if (repeatability.between_known) row.standard_error = repeatability.independent_u(i);
     row.air = air_of(row.measured);
   }
   return table;

@@ -126,7 +126,7 @@ Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& ze
     if (angle.k != 0) shares.push_back(shares_of(angle));
   const double freedom = results::freedom_between(shares);
   result.angles = std::move(angles);
-  result.repeated = freedom > 0;
+  result.repeated = result.between_known = freedom > 0;
   if (result.repeated) result.between = {0, std::sqrt(results::variance_between(shares)), freedom};
   return result;
 }

@@ -53,9 +53,10 @@ struct AngleScatter {
 
 struct Repeatability {
   std::vector<AngleScatter> angles;
-  Estimate between;          ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  bool repeated = false;     ///< at least one φ was measured more than once; otherwise `between` is unknown
-  Estimate zero_movement{};  ///< of a run's zero, usually, N; freedom: the runs behind it
+  Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
+  bool repeated = false;  ///< at least one φ was measured more than once
+  bool between_known = false;  ///< from repetitions, or given
+  Estimate zero_movement{};    ///< of a run's zero, usually, N; freedom: the runs behind it
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;

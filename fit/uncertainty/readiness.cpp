@@ -118,10 +118,10 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
   for (Suspicion& one : all)
     if (one.p < level) flight.doubts.push_back(std::move(one.doubt));
   const bool from_steps = !identification.repeatability.angles.empty();
-  if (from_steps && !identification.repeatability.repeated)
+  if (from_steps && !identification.repeatability.between_known)
     flight.doubts.push_back({Readiness::with_care,
                              "every occlusion was measured once: how much k changes from mounting to mounting is "
-                             "unknown, and not in the ±; repeat the campaign"});
+                             "unknown, and not in the ±; repeat the campaign, or give it (--u mounting=VALUE)"});
   if (!from_steps &&
       std::ranges::any_of(identification.table, [](const auto& row) { return !(row.standard_error > 0); }))
     flight.doubts.push_back(

@@ -204,7 +204,7 @@ void take_trends(Angle& angle, double slowest, double fastest, const Estimate& z
     angle.trends.push_back(found.estimates.back());
     squares += found.covariance.back().back();
     angle.alone_freedom = static_cast<double>(found.freedom);
-    if (angle.runs.size() > 1 || model.zero_is_free || !(zero_movement.value > 0)) continue;
+    if (model.zero_is_free || !(zero_movement.value > 0)) continue;
     const double wandering = variance_by_wandering(model, run.samples, found) * std::pow(zero_movement.value, 2);
     angle.alone_freedom = std::pow(squares + wandering, 2) /
                           (squares * squares / angle.alone_freedom + wandering * wandering / zero_movement.freedom);

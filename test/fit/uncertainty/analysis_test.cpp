@@ -115,6 +115,23 @@ TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
   EXPECT_TRUE(analysis.speed[0].trend.tested());
 }
 
+TEST(Analysis, OneRunEachTakesTheScatterOfMountingsAsGiven) {
+  std::vector<results::StepMean> steps = campaign_steps();
+  std::erase_if(steps, [](const results::StepMean& step) { return step.repetition > 1; });
+  const Identification found = identify(steps, {.mounting = 0.003});
+  AnalysisOptions options;
+  options.bench.mounting = 0.003;
+  const Analysis analysis = analyse(found, options);
+  const BudgetRow& row = row_of(analysis.coefficients[1], "repetitions");
+  EXPECT_EQ(row.evaluation, Evaluation::type_b);
+  EXPECT_NEAR(row.contribution() / found.table[1].k, 0.003, 1e-12);
+  EXPECT_GT(found.table[1].standard_error, 0.003 * found.table[1].k) << "the line and its test allow for it";
+  EXPECT_EQ(analysis.flight.readiness(), Readiness::fit_to_fly);
+  EXPECT_EQ(identify(campaign_steps(), {.mounting = 0.5}).repeatability.between.u,
+            identify(campaign_steps()).repeatability.between.u)
+      << "repetitions tell it better";
+}
+
 TEST(Analysis, OfATableUsesItsOwnErrors) {
   const std::vector<CurvePoint> points{{0, 1.5e-6, 1e-8}, {90, 1.2e-6, 1e-8}, {180, 0.8e-6, 2e-8}, {270, 0.4e-6, 1e-8}};
   const Analysis analysis = analyse(identify_table(points, {.speed_range = {300, 2000}}));
