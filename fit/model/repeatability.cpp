@@ -124,10 +124,11 @@ Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& ze
   std::vector<std::vector<results::RunShare>> shares;
   for (const AngleScatter& angle : angles)
     if (angle.k != 0) shares.push_back(shares_of(angle));
-  const double freedom = results::freedom_between(shares);
   result.angles = std::move(angles);
-  result.repeated = result.between_known = freedom > 0;
-  if (result.repeated) result.between = {0, std::sqrt(results::variance_between(shares)), freedom};
+  result.repeated = result.between_known = results::freedom_between(shares) > 0;
+  if (!result.repeated) return result;
+  const double variance = results::variance_between(shares);
+  result.between = {0, std::sqrt(variance), results::freedom_of(variance, shares)};
   return result;
 }
 

@@ -16,6 +16,9 @@ namespace {
 /// A line that misses a measured k by more than this share of K_T does not give the thrust that was asked for.
 constexpr double kLargestMiss = 0.05;
 
+/// Less than this share of the thrust no flight notices, however surely a test sees it.
+constexpr double kNegligible = 0.001;
+
 /// A run that stands out by less moves the mean of three by less than 0.5 %, and the scatter in the ± has it.
 constexpr double kSmallStray = 0.015;
 
@@ -45,7 +48,7 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
     const double p = of_both(one.lack_of_fit.p, one.trend.p);
     if (std::isnan(p) || one.levels.size() < 2) continue;
     ++count;
-    if (!(p < clearest.p)) continue;
+    if (!(p < clearest.p) || std::abs(one.change.value) < kNegligible) continue;
     clearest.p = p;
     const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
     clearest.doubt.text = fmt::format(
@@ -68,6 +71,7 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
   for (std::size_t i = 0; i < fit.residuals.size(); ++i)
     if (std::abs(fit.residuals[i]) > std::abs(fit.residuals[worst])) worst = i;
   const double miss = fit.residuals[worst] / fit.K_T;
+  if (std::abs(miss) < kNegligible) return Suspicion{};
   return Suspicion{
       p,
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,

@@ -334,14 +334,17 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
 
 void ZeroMovement::add(const StepMean& step) {
   Range& range = of_run_[{step.propeller, step.occlusion_deg, step.repetition}];
+  range.moved = step.zero_moved_n;
   range.lowest = std::fmin(range.lowest, step.zero_n);
   range.highest = std::fmax(range.highest, step.zero_n);
 }
 
 double ZeroMovement::usual_n() const {
   double squares = 0;
-  for (const auto& [run, range] : of_run_)
-    if (range.highest > range.lowest) squares += square(range.highest - range.lowest) / runs();
+  for (const auto& [run, range] : of_run_) {
+    const double among_steps = range.highest > range.lowest ? range.highest - range.lowest : 0;
+    squares += square(std::isnan(range.moved) ? among_steps : range.moved) / runs();
+  }
   return std::sqrt(squares);
 }
 
@@ -361,6 +364,18 @@ double variance_between(std::span<const std::vector<RunShare>> occlusions) {
     (chi_squared(occlusions, middle) > freedom ? low : high) = middle;
   }
   return high;
+}
+
+double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions) {
+  if (!(variance_between > 0)) return freedom_between(occlusions);
+  double freedom = 0;
+  for (const auto& runs : occlusions) {
+    double explained = 0;
+    for (const RunShare& run : runs) explained += run.variance / static_cast<double>(runs.size());
+    if (runs.size() > 1)
+      freedom += static_cast<double>(runs.size() - 1) * square(variance_between / (variance_between + explained));
+  }
+  return std::max(1.0, freedom);
 }
 
 std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {

@@ -42,6 +42,7 @@ class ZeroMovement {
 
  private:
   struct Range {
+    double moved = kNotMeasured;  ///< as the run's own zeros say
     double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
   };
   std::map<std::tuple<std::string, double, int>, Range> of_run_;
@@ -64,6 +65,9 @@ struct RunShare {
 /// Variance from run to run beyond the explained one, pooled over occlusions: the one at which χ² of the runs about the
 /// mean of their occlusion has its expectation (Mandel, Paule, Anal. Chem. 42 (1970) 1194). 0 without repetitions.
 [[nodiscard]] double variance_between(std::span<const std::vector<RunShare>> occlusions);
+/// Degrees of freedom of that variance: fewer than between the runs where noise and zero explain much of their scatter
+/// (twice its square over the variance of its estimate).
+[[nodiscard]] double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions);
 
 /// k of one repetition, N/(rad/s)²: least squares of T = k ω² over the levels that all repetitions have.
 struct RepetitionFigure {
