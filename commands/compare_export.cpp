@@ -155,6 +155,11 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
       ->check(CLI::PositiveNumber);
   command.add_option("--motors", request.options.motors, "number of motors for px4 and gazebo (default 4)")
       ->check(CLI::Range(1, 12));
+  command
+      .add_option_function<std::string>(
+          "--turns", [&request = request](const std::string& text) { request.options.turns = parse_turns(text); },
+          "how the motors turn, seen from above, for the sign of their torque (px4, gazebo)")
+      ->type_name("ccw,cw,…");
   command.footer(
       "Targets:\n" + footer +
       "\nkphi export results/<folder> --to px4 --speed-max-rpm 19100\n"

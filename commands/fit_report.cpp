@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -8,6 +9,7 @@
 #include "commands/inputs.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
+#include "fit/model/table_line.hpp"
 #include "fit/propellers/claims.hpp"
 #include "fit/report/figures.hpp"
 #include "fit/report/fit_summary.hpp"
@@ -178,8 +180,53 @@ void print_findings(const FitRequest& request, const FitInput& input, const Fitt
   print_json(json);
 }
 
+/// Half of the 95 % interval; NaN: unknown.
+double expanded(const Estimate& estimate) {
+  return std::isnan(estimate.u) ? estimate.u : coverage_factor(estimate.freedom) * estimate.u;
+}
+
+std::string words_of(const char* name, const Estimate& estimate, const char* per) {
+  return fmt::format("{:<10} {} N/(rad/s)^2{}\n", name, with_error(estimate.value, expanded(estimate)), per);
+}
+
+Json json_of(const Estimate& estimate) {
+  return {
+      {"value", estimate.value}, {"u", estimate.u}, {"freedom", estimate.freedom}, {"expanded_95", expanded(estimate)}};
+}
+
+/// Of a table that cannot fly: the line and its scatter, on screen alone.
+ExitCode run_table_line(const FitRequest& request, const FitInput& input, const std::string& obstacle) {
+  refuse_for_table(request);
+  const TableLine line = fit_table_line(input.table, request.options.curve.anchored);
+  const char* verdict = words(Readiness::not_yet);
+  if (request.json) {
+    print_json({{"coefficients", nullptr},
+                {"verdict", name_of(Readiness::not_yet)},
+                {"doubts", Json::array({"the table cannot fly: " + obstacle})},
+                {"k_unit", "N/(rad/s)^2"},
+                {"curve",
+                 {{"form", "line"},
+                  {"anchored", line.anchored},
+                  {"intercept", json_of(line.intercept)},
+                  {"slope_per_deg", json_of(line.slope_per_deg)}}},
+                {"points", line.points},
+                {"weighted", line.weighted},
+                {"scatter", line.scatter}});
+  } else {
+    fmt::print("{:<10} {}\n{:<10} the table cannot fly: {}\n{}{}", "verdict", verdict, "", obstacle,
+               words_of("intercept", line.intercept, ""), words_of("slope", line.slope_per_deg, "/deg"));
+    fmt::print("± is 95 % by the scatter of {} points about the line{}\n", line.points,
+               line.weighted ? ", weighted by their u" : "; no u of k was given");
+  }
+  fmt::print(stderr, "kphi fit: {}: {}; no coefficient file was written\n", request.path, obstacle);
+  return ExitCode::data_rejected;
+}
+
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
+  if (!input.table.empty())
+    if (const std::string obstacle = obstacle_to_flight(input.table); !obstacle.empty())
+      return run_table_line(request, input, obstacle);
   if (request.raw && !input.campaign)
     throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
   Fitted fitted{identify_input(input, request), {}};

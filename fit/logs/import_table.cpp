@@ -144,10 +144,6 @@ std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, st
   for (const TableRow& row : table.rows) {
     points.push_back({non_negative(table, row, phi), non_negative(table, row, k) * unit,
                       error && !row.fields[*error].empty() ? non_negative(table, row, *error) * unit : 0});
-    if (points.back().phi_deg >= 360) {
-      throw ConfigurationError(
-          fmt::format("{}:{}: phi_deg is {}; it must be below 360", table.path, row.line, points.back().phi_deg));
-    }
   }
   return points;
 }
