@@ -237,8 +237,10 @@ ExitCode run_fit(const FitRequest& request) {
   if (input.table.empty()) input.provenance.bench = options.bench;
   fitted.analysis = analyse(identification, options);
   fs::create_directories(folder);
-  write_output(file, format_coefficients(fitted, input.provenance));
+  const std::string text = format_coefficients(fitted, input.provenance);
+  write_output(file, text);
   print_findings(request, input, fitted, file);
+  print_doubts(file.string(), compensation::parse_coefficients(text, file.string()));
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   if (!request.no_report) write_report(fitted, input, folder / "report.html");
   const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;

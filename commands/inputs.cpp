@@ -7,6 +7,7 @@
 #include "base/number.hpp"
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "fit/logs/import_table.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
@@ -134,8 +135,15 @@ void add_flight_files(CLI::App& command, std::string& coefficients, std::string&
   add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
 }
 
+void print_doubts(const std::string& path, const compensation::Coefficients& coefficients) {
+  for (const std::string& doubt : compensation::doubts_of(coefficients))
+    fmt::print(stderr, "doubtful      {}: {}\n", path, doubt);
+}
+
 compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
-  const compensation::ThrustCurve curve = compensation::load_coefficients(coefficients).curve;
+  const compensation::Coefficients file = compensation::load_coefficients(coefficients);
+  print_doubts(coefficients, file);
+  const compensation::ThrustCurve curve = file.curve;
   const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
   if (mismatch) throw ConfigurationError(*mismatch);
   return curve;

@@ -45,6 +45,9 @@ struct FittedFolder {
 /// `--coefficients` and `--vehicle`, both required.
 void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle);
 /// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
+/// Says on stderr, one line each, what of the coefficients is unlike any propeller or stand.
+void print_doubts(const std::string& path, const compensation::Coefficients& coefficients);
+
 [[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,
                                                        const profiles::Vehicle& vehicle);
 

@@ -312,6 +312,15 @@ void read_provenance(const Value& map, Coefficients::Provenance& into) {
     into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
 }
 
+/// K_T is the k of the table at φ = 0, to the rounding of a hand that wrote it.
+void refuse_other_k_t(const Value& top, const Coefficients& coefficients) {
+  constexpr double kRounding = 1e-3;
+  const double k_t = coefficients.curve.thrust_coefficient().value();
+  for (const Coefficients::Row& row : coefficients.table)
+    if (row.occlusion.value() == 0.0 && !(std::fabs(row.k.value() / k_t - 1.0) < kRounding))
+      top.map_at("K_T").refuse("K_T is not the k of the table at phi_deg 0", kFitAgain);
+}
+
 }  // namespace
 
 Coefficients parse_coefficients(const std::string& text, const std::string& path) {
@@ -337,6 +346,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   read_propeller(top.map_at("propeller"), coefficients.propeller);
   for (const Value& row : top.rows("table", "a row of the table has no keys"))
     coefficients.table.push_back(read_row(row, scale));
+  refuse_other_k_t(top, coefficients);
   if (top.find("torque"))
     for (const Value& row : top.rows("torque", "a row of the torques has no keys"))
       coefficients.torque.push_back(read_torque(row));
