@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/plausibility.hpp"
 #include "compensation/occlusion.hpp"
@@ -191,7 +192,7 @@ const std::vector<Kind>& kinds() {
            [](Text text, File file) { return summary_of(file.answers.emplace(parse_answers(text, file.path))); },
            {"mountings"}),
       {"coefficients", compensation::kCoefficientFormat,
-       [](Text, File file) { return summary_of(compensation::load_coefficients(file.path)); }},
+       [](Text, File file) { return summary_of(load_sealed_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",
        [](Text text, File file) { return summary_of(sim::parse_faults(text, file.path)); }},
       {"simulated motor", "kphi-sim-motor/1",

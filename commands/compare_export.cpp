@@ -89,8 +89,7 @@ void export_run(const ExportRequest& request) {
 }
 
 void export_coefficients(const ExportRequest& request) {
-  const compensation::Coefficients coefficients =
-      compensation::load_coefficients(coefficient_file_of(request.file).string());
+  const compensation::Coefficients coefficients = load_sealed_coefficients(coefficient_file_of(request.file).string());
   print_doubts(coefficients.path, coefficients);
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;

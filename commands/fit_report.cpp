@@ -19,6 +19,7 @@
 #include "fit/signal/dynamics.hpp"
 #include "fit/uncertainty/analysis.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/checksums.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {
@@ -40,6 +41,14 @@ Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures)
   Figures drawn = draw_figures(fitted, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
   if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
   return drawn;
+}
+
+/// Enters what was written beside a campaign into its SHA256SUMS.
+void record(const FitInput& input, const fs::path& folder, std::vector<fs::path> written) {
+  std::error_code none;
+  if (!input.campaign || !fs::equivalent(input.folder, folder, none)) return;
+  for (const auto& figure : fs::directory_iterator(folder / "figures", none)) written.push_back(figure.path());
+  results::record_sums(input.folder, written);
 }
 
 void write_page(const fs::path& page, const std::string& html) {
@@ -242,7 +251,12 @@ ExitCode run_fit(const FitRequest& request) {
   print_findings(request, input, fitted, file);
   print_doubts(file.string(), compensation::parse_coefficients(text, file.string()));
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
-  if (!request.no_report) write_report(fitted, input, folder / "report.html");
+  std::vector<fs::path> written{file};
+  if (!request.no_report) {
+    write_report(fitted, input, folder / "report.html");
+    written.push_back(folder / "report.html");
+  }
+  record(input, folder, written);
   const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;
   if (refused) fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
   return refused ? ExitCode::data_rejected : ExitCode::ok;
@@ -290,7 +304,9 @@ ExitCode run_report(const ReportRequest& request) {
   if (request.folders.size() > 1) return report_several(request);
   const std::string& path = request.folders.front();
   auto [input, fitted] = fitted_again(path);
-  write_report(fitted, input, request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
+  const fs::path page = request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out);
+  write_report(fitted, input, page);
+  if (request.out.empty()) record(input, path, {page});
   return ExitCode::ok;
 }
 

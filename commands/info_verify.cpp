@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
 #include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/file_layer.hpp"
 #include "results/run_layout.hpp"
@@ -107,6 +109,24 @@ ExitCode info(const VerifyRequest& asked) {
   return ExitCode::ok;
 }
 
+/// Whether coefficients.yaml is as it was written, from the runs that the journal accepted.
+std::vector<std::string> problems_of_coefficients(const CampaignFolder& folder) {
+  std::vector<std::string> problems;
+  const std::string path = folder.coefficients().string();
+  if (!std::filesystem::exists(path) || !std::filesystem::exists(folder.journal())) return problems;
+  try {
+    const CampaignState state = state_of(read_journal(folder.journal()));
+    for (const auto& run : load_sealed_coefficients(path).provenance.runs) {
+      const auto accepted = std::ranges::find(state.accepted, run.file, &AcceptedRun::file);
+      if (accepted == state.accepted.end() || accepted->sha256 != run.sha256)
+        problems.push_back(path + ": fitted from another " + run.file + " than the journal's; fit again");
+    }
+  } catch (const std::runtime_error& error) {
+    problems.emplace_back(error.what());
+  }
+  return problems;
+}
+
 ExitCode verify(const VerifyRequest& asked) {
   Json found{{"path", asked.path}};
   std::vector<std::string> problems, remarks;
@@ -117,6 +137,8 @@ ExitCode verify(const VerifyRequest& asked) {
     found["journal_entries"] = campaign.entries;
     found["torn_last_line"] = campaign.torn_last_line;
     problems = campaign.problems;
+    for (std::string& problem : problems_of_coefficients(CampaignFolder::open(asked.path)))
+      problems.push_back(std::move(problem));
     remarks = campaign.remarks;
     words = fmt::format("{} runs and {} journal entries{}", campaign.runs, campaign.entries,
                         campaign.torn_last_line ? " (the last line of the journal was cut short and is ignored)" : "");

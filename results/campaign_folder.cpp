@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "base/number.hpp"
+#include "results/checksums.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::results {
@@ -81,22 +82,28 @@ std::string set_aside(const CampaignFolder& folder, const std::filesystem::path&
   });
 }
 
-/// File (relative to the folder) → SHA-256, as last written down.
-std::map<std::string, std::string> recorded_digests(const CampaignFolder& folder, CampaignVerification& found) {
+/// Run (relative to the folder) → SHA-256, as last written down.
+std::map<std::string, std::string> digests_of_runs(const JournalReading& journal) {
   std::map<std::string, std::string> digests;
-  if (!std::filesystem::exists(folder.journal())) {
-    found.problems.push_back(folder.journal().string() + ": missing");
-    return digests;
-  }
-  const JournalReading journal = read_journal(folder.journal());
-  found.entries = journal.entries.size();
-  found.torn_last_line = journal.torn_last_line;
-  found.problems.insert(found.problems.end(), journal.problems.begin(), journal.problems.end());
   for (const JournalEntry& entry : journal.entries) {
     const auto& data = entry.data;
     if (!data.is_object() || !data.contains("file") || !data.contains("sha256")) continue;
     if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
   }
+  return digests;
+}
+
+/// Copies of the campaign's files → SHA-256, of its last beginning.
+std::map<std::string, std::string> digests_of_copies(const CampaignFolder& folder, const JournalReading& journal) {
+  std::map<std::string, std::string> digests;
+  const nlohmann::json identity = state_of(journal).identity;
+  const std::pair<const char*, std::filesystem::path> copies[] = {{"campaign_sha256", folder.campaign_file()},
+                                                                  {"bench_sha256", folder.bench_file()},
+                                                                  {"faults_sha256", folder.faults_file()},
+                                                                  {"motor_sha256", folder.motor_file()}};
+  for (const auto& [key, path] : copies)
+    if (identity.is_object() && identity.contains(key) && identity[key].is_string())
+      digests[path.filename().string()] = identity[key];
   return digests;
 }
 
@@ -106,6 +113,12 @@ void check_file(const std::filesystem::path& path, const std::string& sha256, st
   if (!exists) problems.push_back(path.string() + ": missing, but in the journal");
   if (exists && sha256_of_file(path) != sha256)
     problems.push_back(path.string() + ": SHA-256 does not match the journal");
+}
+
+/// Adds a problem unless the folder holds them as given.
+void check_files(const CampaignFolder& folder, const std::map<std::string, std::string>& digests,
+                 std::vector<std::string>& problems) {
+  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, problems);
 }
 
 /// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
@@ -199,10 +212,46 @@ std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const
   return names;
 }
 
+FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& journal) {
+  FilesBeside found;
+  check_files(folder, digests_of_copies(folder, journal), found.problems);
+  std::map<std::string, std::string> tables;
+  bool old = false;
+  for (const JournalEntry& entry : journal.entries) {
+    if (entry.event == kRunAccepted) old = true;
+    if (entry.event != kTablesWritten || !entry.data.is_object() || !entry.data.contains("files")) continue;
+    old = false;
+    for (const auto& [file, digest] : entry.data["files"].items())
+      if (digest.is_string()) tables[file] = digest;
+  }
+  if (!old) check_files(folder, tables, found.problems);
+  if (old)
+    found.remarks.push_back(folder.steps().string() +
+                            ": not written again after the last run; kphi run --resume or kphi replay computes it");
+  return found;
+}
+
 CampaignVerification verify_campaign(const CampaignFolder& folder) {
   CampaignVerification found;
-  const auto digests = recorded_digests(folder, found);
-  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, found.problems);
+  std::map<std::string, std::string> digests;
+  if (std::filesystem::exists(folder.journal())) {
+    const JournalReading journal = read_journal(folder.journal());
+    found.entries = journal.entries.size();
+    found.torn_last_line = journal.torn_last_line;
+    found.problems = journal.problems;
+    digests = digests_of_runs(journal);
+    const FilesBeside beside = files_beside(folder, journal);
+    found.problems.insert(found.problems.end(), beside.problems.begin(), beside.problems.end());
+    found.remarks = beside.remarks;
+  } else {
+    found.problems.push_back(folder.journal().string() + ": missing");
+  }
+  check_files(folder, digests, found.problems);
+  try {
+    for (std::string& problem : unlike_sums(folder.path())) found.problems.push_back(std::move(problem));
+  } catch (const DataRejected& error) {
+    found.problems.emplace_back(error.what());
+  }
   std::vector<std::filesystem::path> runs = folder.complete_runs();
   for (const auto& path : folder.reference_runs()) runs.push_back(path);
   for (const auto& path : runs) {

@@ -88,6 +88,13 @@ struct CampaignState {
 std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const CampaignState& state,
                                              FileLayer& files = disk());
 
+/// The files beside the runs against the journal: tables, and the copies of the campaign's own files.
+struct FilesBeside {
+  std::vector<std::string> problems;  ///< missing or changed; one line each, with the file's name
+  std::vector<std::string> remarks;   ///< tables that were not written again after the last run, by a program that died
+};
+[[nodiscard]] FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& journal);
+
 struct CampaignVerification {
   std::size_t entries = 0;            ///< of the journal
   std::size_t runs = 0;               ///< complete runs looked at
@@ -97,7 +104,8 @@ struct CampaignVerification {
   [[nodiscard]] bool whole() const { return problems.empty(); }
 };
 
-/// Checks the journal's checksums, every run by itself and by its SHA-256 in the journal, and runs missing in either.
+/// Checks the journal's checksums, every run by itself and by its SHA-256 in the journal, runs missing in either, the
+/// files beside them, and what was fitted by its SHA256SUMS.
 [[nodiscard]] CampaignVerification verify_campaign(const CampaignFolder& folder);
 
 }  // namespace kphi::results

@@ -21,6 +21,8 @@ inline constexpr const char* kRunAborted = "run_aborted";
 inline constexpr const char* kCampaignStarted = "campaign_started";
 inline constexpr const char* kCampaignResumed = "campaign_resumed";
 inline constexpr const char* kCampaignFinished = "campaign_finished";
+/// Data: {"files": {"steps.csv": "SHA-256", …}}, after each run that is accepted.
+inline constexpr const char* kTablesWritten = "tables_written";
 
 struct JournalEntry {
   std::uint64_t n = 0;      ///< 1, 2, 3 …
