@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <vector>
@@ -69,8 +70,13 @@ void print_findings(const Import& import, const std::string& path) {
   }
 }
 
-/// Writes the table and says its k, which is returned.
-double import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
+struct ImportedLog {
+  NamedCoefficient coefficient;
+  bool means_nothing = false;
+};
+
+/// Writes the table and says its k.
+ImportedLog import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
   const std::string text = results::read_text(path, results::kLargestLog);
   const Import import = import_table(text, path, options);
   const std::string name = fs::path(path).stem().string();
@@ -81,7 +87,8 @@ double import_file(const std::string& path, const ImportRequest& request, const 
   write_output(folder / "import.json", record);
   print_findings(import, path);
   fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(import.table)));
-  return fit_thrust(points_of(import.table.steps)).parameters.k;
+  const bool spoilt = std::ranges::any_of(import.findings, spoils_k, &LogFinding::kind);
+  return {{name, fit_thrust(points_of(import.table.steps)).parameters.k}, spoilt};
 }
 
 void print_outliers(const std::vector<NamedCoefficient>& group) {
@@ -98,9 +105,12 @@ ExitCode run_import(const ImportRequest& request) {
   const ImportOptions options = options_of(request);
   refuse_same_names(request.files);
   std::vector<NamedCoefficient> group;
+  int spoilt = 0;
   for (const std::string& path : request.files) {
     try {
-      group.push_back({fs::path(path).stem().string(), import_file(path, request, options)});
+      const ImportedLog log = import_file(path, request, options);
+      group.push_back(log.coefficient);
+      spoilt += log.means_nothing ? 1 : 0;
     } catch (const FitError& error) {
       fmt::print(stderr, "kphi: {}\n", error.what());
     } catch (const ConfigurationError& error) {
@@ -109,7 +119,7 @@ ExitCode run_import(const ImportRequest& request) {
     }
   }
   if (request.same_propeller) print_outliers(group);
-  return group.size() == request.files.size() ? ExitCode::ok : ExitCode::data_rejected;
+  return group.size() == request.files.size() && spoilt == 0 ? ExitCode::ok : ExitCode::data_rejected;
 }
 
 }  // namespace
