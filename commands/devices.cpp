@@ -157,7 +157,7 @@ void print(const std::vector<DeviceAnswer>& answers, bool json) {
   }
   for (const DeviceAnswer& answer : answers) {
     fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
-    for (const std::string& line : answer.lines) fmt::print("  {}\n", line);
+    for (const std::string& line : answer.lines) fmt::print("  {}\n", printable(line));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <map>
 #include <vector>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "fit/logs/import_table.hpp"
@@ -62,11 +63,12 @@ void refuse_same_names(const std::vector<std::string>& files) {
 }
 
 void print_findings(const Import& import, const std::string& path) {
-  for (const std::string& column : import.table.unread) fmt::print(stderr, "{}: column skipped: {}\n", path, column);
+  for (const std::string& column : import.table.unread)
+    fmt::print(stderr, "{}: column skipped: {}\n", path, printable(column));
   for (const LogFinding& finding : import.findings) {
     const std::string place = finding.first_line == 0 ? path : fmt::format("{}:{}", path, finding.first_line);
     fmt::print(stderr, "{}: {} ({} row{}): {}\n", place, name_of(finding.kind), finding.rows,
-               finding.rows == 1 ? "" : "s", finding.text);
+               finding.rows == 1 ? "" : "s", printable(finding.text));
   }
 }
 
@@ -112,10 +114,10 @@ ExitCode run_import(const ImportRequest& request) {
       group.push_back(log.coefficient);
       spoilt += log.means_nothing ? 1 : 0;
     } catch (const FitError& error) {
-      fmt::print(stderr, "kphi: {}\n", error.what());
+      fmt::print(stderr, "kphi: {}\n", printable(error.what()));
     } catch (const ConfigurationError& error) {
       if (request.files.size() == 1) throw;
-      fmt::print(stderr, "kphi: {}\n", error.what());
+      fmt::print(stderr, "kphi: {}\n", printable(error.what()));
     }
   }
   if (request.same_propeller) print_outliers(group);

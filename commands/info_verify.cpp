@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "results/campaign_folder.hpp"
@@ -74,7 +75,7 @@ Json describe_folder(const CampaignFolder& folder) {
 
 void print_run(const Json& run) {
   const auto line = [](const std::string& name, const Json& value) {
-    fmt::print("{:28} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+    fmt::print("{:28} {}\n", name, value.is_string() ? printable(value.get<std::string>()) : value.dump());
   };
   for (const auto& [key, value] : run.items()) {
     if (value.is_null()) continue;
@@ -93,7 +94,7 @@ void print_folder(const Json& folder) {
   for (const Json& run : folder["runs"]) {
     fmt::print("  {}: {} at {}°, repetition {}, {} steps, {} samples, {} lost\n",
                std::filesystem::path(run["file"].get<std::string>()).filename().string(),
-               run["propeller"].get<std::string>(), run["occlusion_deg"].dump(), run["repetition"].dump(),
+               printable(run["propeller"].get<std::string>()), run["occlusion_deg"].dump(), run["repetition"].dump(),
                run["steps"].dump(), run["samples"].dump(),
                run["lost_network"].get<std::uint64_t>() + run["lost_host"].get<std::uint64_t>());
   }

@@ -87,7 +87,7 @@ std::map<std::string, std::string> digests_of_runs(const JournalReading& journal
   std::map<std::string, std::string> digests;
   for (const JournalEntry& entry : journal.entries) {
     const auto& data = entry.data;
-    if (!data.is_object() || !data.contains("file") || !data.contains("sha256")) continue;
+    if (!data.contains("file") || !data.contains("sha256")) continue;
     if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
   }
   return digests;
@@ -175,17 +175,22 @@ std::vector<std::filesystem::path> CampaignFolder::other_runs() const {
 }
 
 CampaignState state_of(const JournalReading& journal) {
+  const auto text = [](const JournalEntry& entry, const char* key) {
+    const auto found = entry.data.find(key);
+    return found != entry.data.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
   CampaignState state;
   for (const JournalEntry& entry : journal.entries) {
     if (entry.event == kCampaignStarted || entry.event == kCampaignResumed) state.identity = entry.data;
     if (entry.event == kCampaignResumed) state.safety_stop.clear();
-    if (entry.data.value("safety_stop", false)) state.safety_stop = entry.data.value("reason", "unknown cause");
+    if (const auto stop = entry.data.find("safety_stop"); stop != entry.data.end() && *stop == true) {
+      state.safety_stop = text(entry, "reason");
+      if (state.safety_stop.empty()) state.safety_stop = "unknown cause";
+    }
     state.finished = entry.event == kCampaignFinished;
     if (entry.event != kRunAccepted) continue;
-    const auto file = entry.data.find("file");
-    const auto digest = entry.data.find("sha256");
-    if (file == entry.data.end() || digest == entry.data.end()) continue;
-    state.accepted.push_back({*file, *digest, entry.time_ns});
+    AcceptedRun run{text(entry, "file"), text(entry, "sha256"), entry.time_ns};
+    if (!run.file.empty() && !run.sha256.empty()) state.accepted.push_back(std::move(run));
   }
   return state;
 }
@@ -219,7 +224,7 @@ FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& jou
   bool old = false;
   for (const JournalEntry& entry : journal.entries) {
     if (entry.event == kRunAccepted) old = true;
-    if (entry.event != kTablesWritten || !entry.data.is_object() || !entry.data.contains("files")) continue;
+    if (entry.event != kTablesWritten || !entry.data.contains("files")) continue;
     old = false;
     for (const auto& [file, digest] : entry.data["files"].items())
       if (digest.is_string()) tables[file] = digest;
