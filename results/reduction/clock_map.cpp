@@ -111,4 +111,19 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::s
   return from + static_cast<std::size_t>(std::ranges::partition_point(counts, earlier) - counts.begin());
 }
 
+std::vector<Nanoseconds> sample_times(const RunRecording& run) {
+  std::vector<Nanoseconds> times;
+  times.reserve(run.load_cell.size());
+  if (run.header.load_cell.device_rate_hz > 0) {
+    const LoadCellColumns cell(run.load_cell, run.header);
+    const ClockMap clock(cell, run.header.load_cell.device_rate_hz, run.events);
+    for (const ClockEpoch& epoch : clock.epochs())
+      for (std::size_t i = epoch.begin; i < epoch.end; ++i) times.push_back(clock.time_ns(epoch, i));
+  } else {
+    for (const LoadCellRecord& record : run.load_cell) times.push_back(record.arrival_ns);
+  }
+  for (std::size_t i = 1; i < times.size(); ++i) times[i] = std::max(times[i], times[i - 1] + 1);
+  return times;
+}
+
 }  // namespace kphi::results
