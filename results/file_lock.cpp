@@ -13,7 +13,6 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "base/error.hpp"
 #include "results/file_layer.hpp"

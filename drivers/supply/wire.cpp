@@ -8,7 +8,6 @@
 #include <iterator>
 
 #include "base/number.hpp"
-#include "base/uri.hpp"
 
 namespace kphi::supply {
 namespace {

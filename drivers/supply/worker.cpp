@@ -3,7 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "base/error.hpp"
 #include "base/thread.hpp"
 
 namespace kphi::supply {

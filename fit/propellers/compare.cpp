@@ -14,7 +14,6 @@
 #include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
-#include "fit/numerics/hypothesis_test.hpp"
 #include "results/reduction/bin_statistics.hpp"
 #include "results/steps_csv.hpp"
 

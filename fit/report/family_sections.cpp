@@ -5,7 +5,6 @@
 
 #include <cmath>
 
-#include "fit/propellers/family.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {

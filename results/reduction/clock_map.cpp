@@ -1,7 +1,6 @@
 #include "results/reduction/clock_map.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 
 namespace kphi::results {

@@ -9,9 +9,7 @@
 #include <functional>
 #include <iterator>
 #include <map>
-#include <optional>
 #include <set>
-#include <string>
 #include <tuple>
 #include <type_traits>
 #include <utility>

@@ -1,7 +1,6 @@
 #include "drivers/iq/exchange/exchange.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace kphi::iq {
 namespace {

@@ -1,6 +1,5 @@
 #include "drivers/iq/exchange/requests.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace kphi::iq {

@@ -9,7 +9,6 @@
 #include <pugixml.hpp>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "base/error.hpp"
 #include "base/number.hpp"

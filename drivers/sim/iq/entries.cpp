@@ -1,6 +1,5 @@
 #include "drivers/sim/iq/entries.hpp"
 
-#include <array>
 #include <bit>
 #include <cmath>
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drivers/sim/physics/motor.hpp"
-
 namespace kphi::sim {
 namespace {
 

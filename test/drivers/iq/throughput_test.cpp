@@ -7,13 +7,15 @@
 
 #include "drivers/iq/link/motor.hpp"
 #include "test/drivers/iq/paced_module.hpp"
+#include "test/soon.hpp"
 
 namespace kphi::iq {
 namespace throughput_test {
 
 using namespace std::chrono_literals;
 
-/// Cycles per second in which all of four quantities were read, over a second.
+/// Cycles per second in which all of four quantities were read, over a second by the readings' own stamps; 0: the
+/// module fell silent.
 double rate() {
   fake::PacedModule module(115200);
   const SteadyClock clock;
@@ -27,13 +29,13 @@ double rate() {
   std::array<MotorReading, 512> readings;
   Instant first{kNever}, last{0};
   while (last - std::min(first, last) < 1s) {
-    const std::size_t n = motor.take(readings);
+    std::size_t n = 0;
+    if (!test::soon([&] { return (n = motor.take(readings)) > 0; })) return 0;
     for (std::size_t i = 0; i < n; ++i) {
       ++count[readings[i].channel];
       first = std::min(first, Instant(readings[i].time_ns));
       last = std::max(last, Instant(readings[i].time_ns));
     }
-    std::this_thread::sleep_for(5ms);  // of a second that is measured by the readings' own stamps
   }
   int cycles = 1 << 30;
   for (const MotorChannel quantity : settings.every_cycle) cycles = std::min(cycles, count[quantity]);
