@@ -1,6 +1,7 @@
 #include "drivers/iq/exchange/exchange.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace kphi::iq {
 namespace {
