@@ -34,6 +34,8 @@ Settings session_settings(const Manner& manner) {
   Settings settings;
   settings.module_id = manner.module_id;
   settings.telemetry_hz = manner.telemetry_hz;
+  settings.slow_hz = manner.slow_hz;
+  settings.every_cycle = manner.every_cycle;
   settings.wire_byte_time = manner.paced ? from_seconds(10.0 / manner.baud) : Duration{0};
   settings.wire_paces = manner.paced;
   settings.module_timeout_s = manner.module_timeout_s;

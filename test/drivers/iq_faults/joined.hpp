@@ -14,6 +14,8 @@ namespace kphi::iq::test {
 
 struct Manner {
   double telemetry_hz = 50;
+  double slow_hz = 0;
+  std::vector<MotorChannel> every_cycle{MotorChannel::speed};
   unsigned baud = 115200;
   bool paced = true;
   int module_id = 0;
