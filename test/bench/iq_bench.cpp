@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "drivers/iq/link/motor.hpp"
-#include "test/drivers/iq/paced_module.hpp"
+#include "test/bench/paced_module.hpp"
 #include "test/soon.hpp"
 
 namespace kphi::iq {
