@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "compensation/occlusion.hpp"
 #include "daq/campaign/dry_run.hpp"
 #include "drivers/sim/input_files.hpp"
@@ -42,7 +44,14 @@ struct CheckedFile {
 Plan plan_of(const Campaign& campaign) { return make_plan(campaign, BenchConfig{}); }
 
 std::string summary_of(const Campaign& campaign) {
-  return fmt::format("  {}\n  order {}\n", daq::plan_text(campaign, {}, plan_of(campaign)), to_words(campaign.order));
+  std::string doubts;
+  if (const auto radians = compensation::doubt_of_angles(campaign.occlusions_deg))
+    doubts += "  doubtful   " + *radians + "\n";
+  if (std::ranges::find(campaign.occlusions_deg, 0) == campaign.occlusions_deg.end())
+    doubts +=
+        "  doubtful   no occlusion of 0°: without K_T nothing can be fitted for flight; add 0 to occlusions_deg\n";
+  return fmt::format("  {}\n  order {}\n{}", daq::plan_text(campaign, {}, plan_of(campaign)), to_words(campaign.order),
+                     doubts);
 }
 
 std::string summary_of(const BenchConfig& bench) {
@@ -122,16 +131,18 @@ std::string uncertainty_of(const compensation::Coefficients& file) {
 }
 
 std::string summary_of(const compensation::Coefficients& c) {
+  std::string doubts;
+  for (const std::string& doubt : compensation::doubts_of(c)) doubts += "  doubtful   " + doubt + "\n";
   return fmt::format(
       "  propeller  {} ({})\n"
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
       "  curve      k = {} N/(rad/s)^2{}\n"
       "  valid      {:g}° to {:g}°, overlap measured as {}\n"
-      "{}",
+      "{}{}",
       c.propeller.id, c.propeller.name, c.curve.thrust_coefficient().value(),
       to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve), c.anchored ? ", anchored at K_T" : "",
       to_degrees(c.smallest_occlusion), to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()),
-      uncertainty_of(c));
+      uncertainty_of(c), doubts);
 }
 
 std::string summary_of(const sim::FaultFile& file) {
@@ -181,7 +192,7 @@ const std::vector<Kind>& kinds() {
            [](Text text, File file) { return summary_of(file.answers.emplace(parse_answers(text, file.path))); },
            {"mountings"}),
       {"coefficients", compensation::kCoefficientFormat,
-       [](Text, File file) { return summary_of(compensation::load_coefficients(file.path)); }},
+       [](Text, File file) { return summary_of(load_sealed_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",
        [](Text text, File file) { return summary_of(sim::parse_faults(text, file.path)); }},
       {"simulated motor", "kphi-sim-motor/1",

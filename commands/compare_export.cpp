@@ -12,6 +12,7 @@
 #include "fit/propellers/claims.hpp"
 #include "fit/propellers/compare.hpp"
 #include "fit/report/fit_summary.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {
@@ -79,6 +80,7 @@ void print_lost(const std::vector<std::string>& lost) {
 void export_run(const ExportRequest& request) {
   if (request.to != "csv" && request.to != "mcap")
     throw ConfigurationError(request.file + ": a run holds samples, not coefficients; export it --to csv or mcap");
+  results::require_unchanged_run(request.file, results::digests_beside(request.file));
   const results::RunRecording run = results::read_run(request.file);
   std::ofstream file;
   if (!request.out.empty()) file.open(request.out, std::ios::binary | std::ios::trunc);
@@ -89,8 +91,8 @@ void export_run(const ExportRequest& request) {
 }
 
 void export_coefficients(const ExportRequest& request) {
-  const compensation::Coefficients coefficients =
-      compensation::load_coefficients(coefficient_file_of(request.file).string());
+  const compensation::Coefficients coefficients = load_sealed_coefficients(coefficient_file_of(request.file).string());
+  print_doubts(coefficients.path, coefficients);
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
     const Export result = target.write(coefficients, request.options);
@@ -155,6 +157,11 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
       ->check(CLI::PositiveNumber);
   command.add_option("--motors", request.options.motors, "number of motors for px4 and gazebo (default 4)")
       ->check(CLI::Range(1, 12));
+  command
+      .add_option_function<std::string>(
+          "--turns", [&request = request](const std::string& text) { request.options.turns = parse_turns(text); },
+          "how the motors turn, seen from above, for the sign of their torque (px4, gazebo)")
+      ->type_name("ccw,cw,…");
   command.footer(
       "Targets:\n" + footer +
       "\nkphi export results/<folder> --to px4 --speed-max-rpm 19100\n"

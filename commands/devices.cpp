@@ -1,6 +1,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/air_source.hpp"
@@ -157,7 +158,7 @@ void print(const std::vector<DeviceAnswer>& answers, bool json) {
   }
   for (const DeviceAnswer& answer : answers) {
     fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
-    for (const std::string& line : answer.lines) fmt::print("  {}\n", line);
+    for (const std::string& line : answer.lines) fmt::print("  {}\n", printable(line));
   }
 }
 

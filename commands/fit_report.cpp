@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <map>
@@ -8,6 +9,7 @@
 #include "commands/inputs.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
+#include "fit/model/table_line.hpp"
 #include "fit/propellers/claims.hpp"
 #include "fit/report/figures.hpp"
 #include "fit/report/fit_summary.hpp"
@@ -17,6 +19,7 @@
 #include "fit/signal/dynamics.hpp"
 #include "fit/uncertainty/analysis.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/checksums.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {
@@ -38,6 +41,14 @@ Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures)
   Figures drawn = draw_figures(fitted, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
   if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
   return drawn;
+}
+
+/// Enters what was written beside a campaign into its SHA256SUMS.
+void record(const FitInput& input, const fs::path& folder, std::vector<fs::path> written) {
+  std::error_code none;
+  if (!input.campaign || !fs::equivalent(input.folder, folder, none)) return;
+  for (const auto& figure : fs::directory_iterator(folder / "figures", none)) written.push_back(figure.path());
+  results::record_sums(input.folder, written);
 }
 
 void write_page(const fs::path& page, const std::string& html) {
@@ -89,6 +100,9 @@ IdentificationOptions options_of(const FitRequest& request) {
   options.speed_range = parse_speed_range(request.speed_range_rpm, options.speed_range);
   if (request.at_speed_rpm) options.at_speed_rad_s = from_rpm(*request.at_speed_rpm).value();
   for (const std::string& text : request.left_out) options.left_out.push_back(parse_left_out_run(text));
+  BenchUncertainty given;
+  for (const std::string& text : request.uncertainties) set_uncertainty(given, text);
+  options.mounting = given.mounting;
   return options;
 }
 
@@ -175,8 +189,65 @@ void print_findings(const FitRequest& request, const FitInput& input, const Fitt
   print_json(json);
 }
 
+/// Half of the 95 % interval; NaN: unknown.
+double expanded(const Estimate& estimate) {
+  return std::isnan(estimate.u) ? estimate.u : coverage_factor(estimate.freedom) * estimate.u;
+}
+
+std::string words_of(const char* name, const Estimate& estimate, const char* per) {
+  return fmt::format("{:<10} {} N/(rad/s)^2{}\n", name, with_error(estimate.value, expanded(estimate)), per);
+}
+
+Json json_of(const Estimate& estimate) {
+  return {
+      {"value", estimate.value}, {"u", estimate.u}, {"freedom", estimate.freedom}, {"expanded_95", expanded(estimate)}};
+}
+
+/// Of a table that cannot fly: the line and its scatter, on screen alone.
+ExitCode run_table_line(const FitRequest& request, const FitInput& input, const std::string& obstacle) {
+  refuse_for_table(request);
+  const TableLine line = fit_table_line(input.table, request.options.curve.anchored);
+  const char* verdict = words(Readiness::not_yet);
+  if (request.json) {
+    print_json({{"coefficients", nullptr},
+                {"verdict", name_of(Readiness::not_yet)},
+                {"doubts", Json::array({"the table cannot fly: " + obstacle})},
+                {"k_unit", "N/(rad/s)^2"},
+                {"curve",
+                 {{"form", "line"},
+                  {"anchored", line.anchored},
+                  {"intercept", json_of(line.intercept)},
+                  {"slope_per_deg", json_of(line.slope_per_deg)}}},
+                {"points", line.points},
+                {"weighted", line.weighted},
+                {"scatter", line.scatter}});
+  } else {
+    fmt::print("{:<10} {}\n{:<10} the table cannot fly: {}\n{}{}", "verdict", verdict, "", obstacle,
+               words_of("intercept", line.intercept, ""), words_of("slope", line.slope_per_deg, "/deg"));
+    fmt::print("± is 95 % by the scatter of {} points about the line{}\n", line.points,
+               line.weighted ? ", weighted by their u" : "; no u of k was given");
+  }
+  fmt::print(stderr, "kphi fit: {}: {}; no coefficient file was written\n", request.path, obstacle);
+  return ExitCode::data_rejected;
+}
+
+/// Of a log without occlusions: K_T with its budget and a report, but nothing to fly with.
+ExitCode run_K_T_alone(const FitRequest& request, FitInput& input, const Fitted& fitted) {
+  if (!request.out.empty())
+    throw ConfigurationError(request.path +
+                             ": no occlusion was measured, so no coefficient file can be written; "
+                             "leave --out away");
+  print_findings(request, input, fitted, {});
+  fmt::print(stderr, "{}", caution_text(fitted.identification, fitted.analysis));
+  if (!request.no_report) write_report(fitted, input, input.folder / "report.html");
+  return ExitCode::ok;
+}
+
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
+  if (!input.table.empty())
+    if (const std::string obstacle = obstacle_to_flight(input.table); !obstacle.empty())
+      return run_table_line(request, input, obstacle);
   if (request.raw && !input.campaign)
     throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
   Fitted fitted{identify_input(input, request), {}};
@@ -186,11 +257,19 @@ ExitCode run_fit(const FitRequest& request) {
   const AnalysisOptions options = analysis_options(request, input, identification);
   if (input.table.empty()) input.provenance.bench = options.bench;
   fitted.analysis = analyse(identification, options);
+  if (identification.alone()) return run_K_T_alone(request, input, fitted);
   fs::create_directories(folder);
-  write_output(file, format_coefficients(fitted, input.provenance));
+  const std::string text = format_coefficients(fitted, input.provenance);
+  write_output(file, text);
   print_findings(request, input, fitted, file);
+  print_doubts(file.string(), compensation::parse_coefficients(text, file.string()));
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
-  if (!request.no_report) write_report(fitted, input, folder / "report.html");
+  std::vector<fs::path> written{file};
+  if (!request.no_report) {
+    write_report(fitted, input, folder / "report.html");
+    written.push_back(folder / "report.html");
+  }
+  record(input, folder, written);
   const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;
   if (refused) fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
   return refused ? ExitCode::data_rejected : ExitCode::ok;
@@ -238,7 +317,9 @@ ExitCode run_report(const ReportRequest& request) {
   if (request.folders.size() > 1) return report_several(request);
   const std::string& path = request.folders.front();
   auto [input, fitted] = fitted_again(path);
-  write_report(fitted, input, request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out));
+  const fs::path page = request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out);
+  write_report(fitted, input, page);
+  if (request.out.empty()) record(input, path, {page});
   return ExitCode::ok;
 }
 
@@ -271,9 +352,10 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_choice(command, "--overlap", request.options.overlap,
              "how φ is measured in flight, to be the same in the vehicle file",
              {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
-  add_value(command, "--u", "NAME=VALUE", request.uncertainties,
-            "standard uncertainty of calibration, cross-axis, clock, density (all relative) or alignment-deg; may "
-            "be repeated")
+  add_value(
+      command, "--u", "NAME=VALUE", request.uncertainties,
+      "standard uncertainty of calibration, cross-axis, clock, density, mounting (all relative) or alignment-deg; may "
+      "be repeated")
       ->allow_extra_args(false);
   add_value(command, "--leave-out", "PHI:REPETITION:CAUSE", request.left_out,
             "leave out a run for a known cause, which the report names; may be repeated")

@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <vector>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "fit/logs/import_table.hpp"
@@ -61,16 +63,22 @@ void refuse_same_names(const std::vector<std::string>& files) {
 }
 
 void print_findings(const Import& import, const std::string& path) {
-  for (const std::string& column : import.table.unread) fmt::print(stderr, "{}: column skipped: {}\n", path, column);
+  for (const std::string& column : import.table.unread)
+    fmt::print(stderr, "{}: column skipped: {}\n", path, printable(column));
   for (const LogFinding& finding : import.findings) {
     const std::string place = finding.first_line == 0 ? path : fmt::format("{}:{}", path, finding.first_line);
     fmt::print(stderr, "{}: {} ({} row{}): {}\n", place, name_of(finding.kind), finding.rows,
-               finding.rows == 1 ? "" : "s", finding.text);
+               finding.rows == 1 ? "" : "s", printable(finding.text));
   }
 }
 
-/// Writes the table and says its k, which is returned.
-double import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
+struct ImportedLog {
+  NamedCoefficient coefficient;
+  bool means_nothing = false;
+};
+
+/// Writes the table and says its k.
+ImportedLog import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
   const std::string text = results::read_text(path, results::kLargestLog);
   const Import import = import_table(text, path, options);
   const std::string name = fs::path(path).stem().string();
@@ -81,7 +89,8 @@ double import_file(const std::string& path, const ImportRequest& request, const 
   write_output(folder / "import.json", record);
   print_findings(import, path);
   fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(import.table)));
-  return fit_thrust(points_of(import.table.steps)).parameters.k;
+  const bool spoilt = std::ranges::any_of(import.findings, spoils_k, &LogFinding::kind);
+  return {{name, fit_thrust(points_of(import.table.steps)).parameters.k}, spoilt};
 }
 
 void print_outliers(const std::vector<NamedCoefficient>& group) {
@@ -98,18 +107,21 @@ ExitCode run_import(const ImportRequest& request) {
   const ImportOptions options = options_of(request);
   refuse_same_names(request.files);
   std::vector<NamedCoefficient> group;
+  int spoilt = 0;
   for (const std::string& path : request.files) {
     try {
-      group.push_back({fs::path(path).stem().string(), import_file(path, request, options)});
+      const ImportedLog log = import_file(path, request, options);
+      group.push_back(log.coefficient);
+      spoilt += log.means_nothing ? 1 : 0;
     } catch (const FitError& error) {
-      fmt::print(stderr, "kphi: {}\n", error.what());
+      fmt::print(stderr, "kphi: {}\n", printable(error.what()));
     } catch (const ConfigurationError& error) {
       if (request.files.size() == 1) throw;
-      fmt::print(stderr, "kphi: {}\n", error.what());
+      fmt::print(stderr, "kphi: {}\n", printable(error.what()));
     }
   }
   if (request.same_propeller) print_outliers(group);
-  return group.size() == request.files.size() ? ExitCode::ok : ExitCode::data_rejected;
+  return group.size() == request.files.size() && spoilt == 0 ? ExitCode::ok : ExitCode::data_rejected;
 }
 
 }  // namespace

@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
+#include "base/text.hpp"
 #include "commands/commands.hpp"
+#include "commands/inputs.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/file_layer.hpp"
 #include "results/run_layout.hpp"
@@ -72,7 +75,7 @@ Json describe_folder(const CampaignFolder& folder) {
 
 void print_run(const Json& run) {
   const auto line = [](const std::string& name, const Json& value) {
-    fmt::print("{:28} {}\n", name, value.is_string() ? value.get<std::string>() : value.dump());
+    fmt::print("{:28} {}\n", name, value.is_string() ? printable(value.get<std::string>()) : value.dump());
   };
   for (const auto& [key, value] : run.items()) {
     if (value.is_null()) continue;
@@ -91,7 +94,7 @@ void print_folder(const Json& folder) {
   for (const Json& run : folder["runs"]) {
     fmt::print("  {}: {} at {}°, repetition {}, {} steps, {} samples, {} lost\n",
                std::filesystem::path(run["file"].get<std::string>()).filename().string(),
-               run["propeller"].get<std::string>(), run["occlusion_deg"].dump(), run["repetition"].dump(),
+               printable(run["propeller"].get<std::string>()), run["occlusion_deg"].dump(), run["repetition"].dump(),
                run["steps"].dump(), run["samples"].dump(),
                run["lost_network"].get<std::uint64_t>() + run["lost_host"].get<std::uint64_t>());
   }
@@ -107,6 +110,24 @@ ExitCode info(const VerifyRequest& asked) {
   return ExitCode::ok;
 }
 
+/// Whether coefficients.yaml is as it was written, from the runs that the journal accepted.
+std::vector<std::string> problems_of_coefficients(const CampaignFolder& folder) {
+  std::vector<std::string> problems;
+  const std::string path = folder.coefficients().string();
+  if (!std::filesystem::exists(path) || !std::filesystem::exists(folder.journal())) return problems;
+  try {
+    const CampaignState state = state_of(read_journal(folder.journal()));
+    for (const auto& run : load_sealed_coefficients(path).provenance.runs) {
+      const auto accepted = std::ranges::find(state.accepted, run.file, &AcceptedRun::file);
+      if (accepted == state.accepted.end() || accepted->sha256 != run.sha256)
+        problems.push_back(path + ": fitted from another " + run.file + " than the journal's; fit again");
+    }
+  } catch (const std::runtime_error& error) {
+    problems.emplace_back(error.what());
+  }
+  return problems;
+}
+
 ExitCode verify(const VerifyRequest& asked) {
   Json found{{"path", asked.path}};
   std::vector<std::string> problems, remarks;
@@ -117,6 +138,8 @@ ExitCode verify(const VerifyRequest& asked) {
     found["journal_entries"] = campaign.entries;
     found["torn_last_line"] = campaign.torn_last_line;
     problems = campaign.problems;
+    for (std::string& problem : problems_of_coefficients(CampaignFolder::open(asked.path)))
+      problems.push_back(std::move(problem));
     remarks = campaign.remarks;
     words = fmt::format("{} runs and {} journal entries{}", campaign.runs, campaign.entries,
                         campaign.torn_last_line ? " (the last line of the journal was cut short and is ignored)" : "");

@@ -7,10 +7,12 @@
 #include "base/number.hpp"
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "fit/logs/import_table.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/checksums.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/steps_csv.hpp"
@@ -23,6 +25,20 @@ using namespace fit;
 
 namespace fs = std::filesystem;
 
+/// Throws DataRejected if the journal or a file beside the runs is not as kphi left it.
+void require_unchanged(const results::CampaignFolder& folder, const results::JournalReading& journal) {
+  const auto [problems, remarks] = results::files_beside(folder, journal);
+  for (const std::string& remark : remarks) fmt::print(stderr, "kphi: {}\n", remark);
+  const std::string& first = !journal.problems.empty() ? journal.problems.front()
+                             : !problems.empty()       ? problems.front()
+                                                       : std::string();
+  if (!first.empty())
+    throw DataRejected(
+        fmt::format("{}; `kphi verify {}` lists all, `kphi replay {}` computes the tables again from the "
+                    "runs, and a table of your own is fitted by its name",
+                    first, folder.path().string(), folder.path().string()));
+}
+
 /// Rejected runs, accepted ones with the checksums the journal holds, and when the last of them ended; without a
 /// journal the files as they lie there.
 void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
@@ -32,7 +48,9 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
           {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
     return;
   }
-  for (const results::JournalEntry& entry : results::read_journal(folder.journal()).entries) {
+  const results::JournalReading journal = results::read_journal(folder.journal());
+  require_unchanged(folder, journal);
+  for (const results::JournalEntry& entry : journal.entries) {
     const auto text = [&](const char* key) {
       const bool is_text = entry.data.contains(key) && entry.data[key].is_string();
       return is_text ? entry.data[key].get<std::string>() : std::string("unknown");
@@ -117,9 +135,17 @@ fs::path coefficient_file_of(const std::string& path) {
 
 FittedFolder fitted_again(const std::string& folder) {
   FitInput input = load_input(folder);
+  const bool alone = !input.steps.empty() &&
+                     std::ranges::all_of(input.steps, [](const auto& step) { return step.occlusion_deg == 0; });
+  if (alone && !fs::exists(fs::path(folder) / "coefficients.yaml")) {
+    Identification K_T = identify(input.steps);
+    Analysis analysis = analyse(K_T, analysis_options(input, K_T));
+    return {std::move(input), {std::move(K_T), std::move(analysis)}};
+  }
   const fs::path file = coefficient_file_of(folder);
   if (!input.table.empty())
     throw ConfigurationError(folder + ": steps.csv is a table of k without steps; use the report of `kphi fit`");
+  results::require_seal(results::read_text(file), file.string());
   const RecordedFit record = read_recorded_fit(file.string());
   Identification identification = identify(input.steps, record.options);
   AnalysisOptions options = analysis_options(input, identification);
@@ -134,8 +160,21 @@ void add_flight_files(CLI::App& command, std::string& coefficients, std::string&
   add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
 }
 
+compensation::Coefficients load_sealed_coefficients(const std::string& path) {
+  compensation::Coefficients file = compensation::load_coefficients(path);
+  results::require_seal(results::read_text(path), path);
+  return file;
+}
+
+void print_doubts(const std::string& path, const compensation::Coefficients& coefficients) {
+  for (const std::string& doubt : compensation::doubts_of(coefficients))
+    fmt::print(stderr, "doubtful      {}: {}\n", path, doubt);
+}
+
 compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
-  const compensation::ThrustCurve curve = compensation::load_coefficients(coefficients).curve;
+  const compensation::Coefficients file = load_sealed_coefficients(coefficients);
+  print_doubts(coefficients, file);
+  const compensation::ThrustCurve curve = file.curve;
   const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
   if (mismatch) throw ConfigurationError(*mismatch);
   return curve;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compensation/file/coefficient_file.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "daq/live/live_session.hpp"
 #include "fit/coefficients/coefficients.hpp"
@@ -44,6 +45,11 @@ struct FittedFolder {
 
 /// `--coefficients` and `--vehicle`, both required.
 void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle);
+/// As compensation::load_coefficients. Throws DataRejected if the file was changed since it was written.
+[[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path);
+/// Says on stderr, one line each, what of the coefficients is unlike any propeller or stand.
+void print_doubts(const std::string& path, const compensation::Coefficients& coefficients);
+
 /// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
 [[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,
                                                        const profiles::Vehicle& vehicle);

@@ -2,6 +2,7 @@
 #include <atomic>
 #include <filesystem>
 #include <future>
+#include <map>
 #include <optional>
 #include <span>
 #include <thread>
@@ -40,11 +41,16 @@ struct Replay {
   std::optional<std::string> difference;        ///< of that table, or of another one of the campaign
 };
 
-/// Steps in the order of the files; a thread per processor.
+/// Steps in the order of the files; a thread per processor. Throws DataRejected for a run that was changed.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   std::vector<std::packaged_task<std::vector<StepMean>(results::LoadCellColumns&)>> tasks;
+  std::map<std::string, std::string> digests;
+  if (!runs.empty()) digests = results::digests_beside(runs.front());
   for (const auto& run : runs) {
-    tasks.emplace_back([&run](auto& cell) { return reduce(results::read_run(run, cell), cell); });
+    tasks.emplace_back([&](auto& cell) {
+      results::require_unchanged_run(run, digests);
+      return reduce(results::read_run(run, cell), cell);
+    });
   }
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {
@@ -160,6 +166,7 @@ ExitCode show_replay(const ReplayRequest& asked) {
   if (std::filesystem::is_directory(asked.path))
     throw ConfigurationError(asked.path +
                              ": --live and --udp-json show one run, not a folder; name a file of its runs/");
+  results::require_unchanged_run(asked.path, results::digests_beside(asked.path));
   const results::RunRecording recording = results::read_run(asked.path);
   live::LiveSession view(asked.live, live::subject_of(recording));
   put(stderr, live_greeting(view));

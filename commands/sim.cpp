@@ -12,7 +12,7 @@
 #include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/sim/bench_server.hpp"
 #include "drivers/sim/control_line.hpp"
-#include "drivers/sim/physics/truth.hpp"
+#include "drivers/sim/physics/stand.hpp"
 #include "drivers/sim/truth_log.hpp"
 #include "profiles/bench_config.hpp"
 
@@ -145,10 +145,12 @@ ExitCode send(const profiles::BenchConfig& bench, const std::string& line) {
 }
 
 ExitCode serve(const profiles::BenchConfig& bench, const SimRequest& options) {
-  Server server(settings_of(bench, options));
+  const ServerSettings settings = settings_of(bench, options);
+  Server server(settings);
   if (!options.truth_log.empty())
     write_output(options.truth_log, "");  // refuses an unwritable file now, not at the end
-  if (!options.truth.empty()) write_output(options.truth, truth_yaml(bench.simulation->seed));
+  if (!options.truth.empty())
+    write_output(options.truth, truth_yaml(bench.simulation->seed, settings.bench.plant.stand));
   if (!options.resolved.empty()) write_output(options.resolved, resolved_text(bench, server.addresses()));
   running = &server;
   std::signal(SIGINT, stop_running);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "profiles/profile_reader.hpp"
@@ -86,6 +87,26 @@ AmbientConfig read_ambient(const ProfileReader& file) {
                         value("u_temperature_c"), value("u_pressure_pa"), value("u_relative_humidity")}};
 }
 
+SimulatedStand read_stand(const ProfileReader& file) {
+  const std::string at = "/simulation/stand";
+  SimulatedStand stand;
+  if (file.has(at + "/law"))
+    stand.law = {file.number(at + "/law/K_T_n_s2_per_rad2"), file.number(at + "/law/intercept_n_s2_per_rad2"),
+                 file.number(at + "/law/slope_n_s2_per_rad2_deg")};
+  stand.bend = file.get_or(at + "/bend", stand.bend);
+  stand.rise_per_krad_s = file.get_or(at + "/rise_per_krad_s", stand.rise_per_krad_s);
+  stand.mounting = file.get_or(at + "/mounting", stand.mounting);
+  stand.zero_walk_n = file.find<double>(at + "/zero_walk_n");
+  stand.slow_noise_n = file.get_or(at + "/slow_noise_n", stand.slow_noise_n);
+  stand.slow_noise_s = file.get_or(at + "/slow_noise_s", stand.slow_noise_s);
+  for (std::size_t i = 0; file.has(fmt::format("{}/plates/{}", at, i)); ++i) {
+    const std::string plate = fmt::format("{}/plates/{}/", at, i);
+    stand.plates.push_back(
+        {file.number(plate + "named_deg"), file.number(plate + "true_deg"), file.find<int>(plate + "repetition")});
+  }
+  return stand;
+}
+
 Simulation read_simulation(ProfileReader& file, const std::filesystem::path& folder) {
   Simulation simulation;
   simulation.in_process = file.get_or("/simulation/in_process", simulation.in_process);
@@ -96,6 +117,12 @@ Simulation read_simulation(ProfileReader& file, const std::filesystem::path& fol
   if (file.has("/simulation/motor")) simulation.motor = (folder / file.text("/simulation/motor")).string();
   simulation.durable = file.get_or("/simulation/durable", simulation.durable);
   simulation.air_density_kg_m3 = file.get_or("/simulation/air_density_kg_m3", simulation.air_density_kg_m3);
+  simulation.stand = read_stand(file);
+  const bool whole = !simulation.in_process || !simulation.faults.empty();
+  if (whole &&
+      std::ranges::any_of(simulation.stand.plates, [](const auto& plate) { return plate.repetition.has_value(); }))
+    file.refuse("/simulation/stand/plates", "a bench that lives through the campaign does not know its repetitions",
+                "leave repetition out, or set in_process: true without faults");
   if (!simulation.in_process && simulation.control.empty()) {
     file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
   }

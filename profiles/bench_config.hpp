@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "compensation/units.hpp"
 #include "profiles/limits.hpp"
@@ -57,6 +58,22 @@ struct SupplyConfig {
   Amperes over_current;   ///< at which it switches off
 };
 
+/// What the simulated stand has beside its nominal propellers (bench.schema.json); shares are of k.
+struct SimulatedStand {
+  struct Law {
+    double K_T = 0, intercept = 0, slope_per_deg = 0;  ///< N/(rad/s)²
+  };
+  struct Plate {
+    double named_deg = 0, true_deg = 0;
+    std::optional<int> repetition;  ///< nullopt: in all
+  };
+  std::optional<Law> law;
+  double bend = 0, rise_per_krad_s = 0, mounting = 0;
+  std::optional<double> zero_walk_n;  ///< after one minute
+  double slow_noise_n = 0, slow_noise_s = 1;
+  std::vector<Plate> plates;
+};
+
 /// The simulated bench: how fast, from which seed, and the socket that tells it what is mounted.
 struct Simulation {
   bool in_process = false;  ///< true: the deterministic bench, virtual time, no transport
@@ -66,7 +83,8 @@ struct Simulation {
   std::string faults;   ///< path of a fault script; in the file relative to the file's folder; empty: none
   std::string motor;    ///< path of a simulated motor, likewise; empty: the 2306 that is built in
   double air_density_kg_m3 = 1.225;  ///< of the simulated air
-  bool durable = false;              ///< in process: records survive a power cut, as on a real bench; costs time
+  SimulatedStand stand;
+  bool durable = false;  ///< in process: records survive a power cut, as on a real bench; costs time
 };
 
 /// Read off by a person, with standard uncertainties.

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cctype>
-#include <map>
 #include <optional>
 #include <system_error>
 #include <tuple>
 #include <utility>
 
+#include "base/error.hpp"
 #include "base/number.hpp"
+#include "results/checksums.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::results {
@@ -80,22 +81,28 @@ std::string set_aside(const CampaignFolder& folder, const std::filesystem::path&
   });
 }
 
-/// File (relative to the folder) → SHA-256, as last written down.
-std::map<std::string, std::string> recorded_digests(const CampaignFolder& folder, CampaignVerification& found) {
+/// Run (relative to the folder) → SHA-256, as last written down.
+std::map<std::string, std::string> digests_of_runs(const JournalReading& journal) {
   std::map<std::string, std::string> digests;
-  if (!std::filesystem::exists(folder.journal())) {
-    found.problems.push_back(folder.journal().string() + ": missing");
-    return digests;
-  }
-  const JournalReading journal = read_journal(folder.journal());
-  found.entries = journal.entries.size();
-  found.torn_last_line = journal.torn_last_line;
-  found.problems.insert(found.problems.end(), journal.problems.begin(), journal.problems.end());
   for (const JournalEntry& entry : journal.entries) {
     const auto& data = entry.data;
-    if (!data.is_object() || !data.contains("file") || !data.contains("sha256")) continue;
+    if (!data.contains("file") || !data.contains("sha256")) continue;
     if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
   }
+  return digests;
+}
+
+/// Copies of the campaign's files → SHA-256, of its last beginning.
+std::map<std::string, std::string> digests_of_copies(const CampaignFolder& folder, const JournalReading& journal) {
+  std::map<std::string, std::string> digests;
+  const nlohmann::json identity = state_of(journal).identity;
+  const std::pair<const char*, std::filesystem::path> copies[] = {{"campaign_sha256", folder.campaign_file()},
+                                                                  {"bench_sha256", folder.bench_file()},
+                                                                  {"faults_sha256", folder.faults_file()},
+                                                                  {"motor_sha256", folder.motor_file()}};
+  for (const auto& [key, path] : copies)
+    if (identity.is_object() && identity.contains(key) && identity[key].is_string())
+      digests[path.filename().string()] = identity[key];
   return digests;
 }
 
@@ -105,6 +112,12 @@ void check_file(const std::filesystem::path& path, const std::string& sha256, st
   if (!exists) problems.push_back(path.string() + ": missing, but in the journal");
   if (exists && sha256_of_file(path) != sha256)
     problems.push_back(path.string() + ": SHA-256 does not match the journal");
+}
+
+/// Adds a problem unless the folder holds them as given.
+void check_files(const CampaignFolder& folder, const std::map<std::string, std::string>& digests,
+                 std::vector<std::string>& problems) {
+  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, problems);
 }
 
 /// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
@@ -161,17 +174,22 @@ std::vector<std::filesystem::path> CampaignFolder::other_runs() const {
 }
 
 CampaignState state_of(const JournalReading& journal) {
+  const auto text = [](const JournalEntry& entry, const char* key) {
+    const auto found = entry.data.find(key);
+    return found != entry.data.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
   CampaignState state;
   for (const JournalEntry& entry : journal.entries) {
     if (entry.event == kCampaignStarted || entry.event == kCampaignResumed) state.identity = entry.data;
     if (entry.event == kCampaignResumed) state.safety_stop.clear();
-    if (entry.data.value("safety_stop", false)) state.safety_stop = entry.data.value("reason", "unknown cause");
+    if (const auto stop = entry.data.find("safety_stop"); stop != entry.data.end() && *stop == true) {
+      state.safety_stop = text(entry, "reason");
+      if (state.safety_stop.empty()) state.safety_stop = "unknown cause";
+    }
     state.finished = entry.event == kCampaignFinished;
     if (entry.event != kRunAccepted) continue;
-    const auto file = entry.data.find("file");
-    const auto digest = entry.data.find("sha256");
-    if (file == entry.data.end() || digest == entry.data.end()) continue;
-    state.accepted.push_back({*file, *digest, entry.time_ns});
+    AcceptedRun run{text(entry, "file"), text(entry, "sha256"), entry.time_ns};
+    if (!run.file.empty() && !run.sha256.empty()) state.accepted.push_back(std::move(run));
   }
   return state;
 }
@@ -180,6 +198,26 @@ std::vector<std::string> changed_runs(const CampaignFolder& folder, const Campai
   std::vector<std::string> problems;
   for (const AcceptedRun& run : state.accepted) check_file(folder.path() / run.file, run.sha256, problems);
   return problems;
+}
+
+std::map<std::string, std::string> digests_beside(const std::filesystem::path& run) {
+  std::map<std::string, std::string> digests;
+  const std::filesystem::path runs = std::filesystem::absolute(run).parent_path();
+  const std::filesystem::path journal = runs.parent_path() / "journal.jsonl";
+  if (runs.filename() != "runs" || !std::filesystem::exists(journal)) return digests;
+  for (const AcceptedRun& accepted : state_of(read_journal(journal)).accepted)
+    digests[std::filesystem::path(accepted.file).filename().string()] = accepted.sha256;
+  return digests;
+}
+
+void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, std::string>& digests) {
+  std::vector<std::string> problems;
+  if (const auto known = digests.find(run.filename().string()); known != digests.end())
+    check_file(run, known->second, problems);
+  else if (run.extension() == ".h5")
+    problems = verify_run(run).problems;
+  if (!problems.empty())
+    throw DataRejected(with_file(run, problems.front()) + "; restore it from a copy, or repeat the run");
 }
 
 std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const CampaignState& state,
@@ -198,10 +236,46 @@ std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const
   return names;
 }
 
+FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& journal) {
+  FilesBeside found;
+  check_files(folder, digests_of_copies(folder, journal), found.problems);
+  std::map<std::string, std::string> tables;
+  bool old = false;
+  for (const JournalEntry& entry : journal.entries) {
+    if (entry.event == kRunAccepted) old = true;
+    if (entry.event != kTablesWritten || !entry.data.contains("files")) continue;
+    old = false;
+    for (const auto& [file, digest] : entry.data["files"].items())
+      if (digest.is_string()) tables[file] = digest;
+  }
+  if (!old) check_files(folder, tables, found.problems);
+  if (old)
+    found.remarks.push_back(folder.steps().string() +
+                            ": not written again after the last run; kphi run --resume or kphi replay computes it");
+  return found;
+}
+
 CampaignVerification verify_campaign(const CampaignFolder& folder) {
   CampaignVerification found;
-  const auto digests = recorded_digests(folder, found);
-  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, found.problems);
+  std::map<std::string, std::string> digests;
+  if (std::filesystem::exists(folder.journal())) {
+    const JournalReading journal = read_journal(folder.journal());
+    found.entries = journal.entries.size();
+    found.torn_last_line = journal.torn_last_line;
+    found.problems = journal.problems;
+    digests = digests_of_runs(journal);
+    const FilesBeside beside = files_beside(folder, journal);
+    found.problems.insert(found.problems.end(), beside.problems.begin(), beside.problems.end());
+    found.remarks = beside.remarks;
+  } else {
+    found.problems.push_back(folder.journal().string() + ": missing");
+  }
+  check_files(folder, digests, found.problems);
+  try {
+    for (std::string& problem : unlike_sums(folder.path())) found.problems.push_back(std::move(problem));
+  } catch (const DataRejected& error) {
+    found.problems.emplace_back(error.what());
+  }
   std::vector<std::filesystem::path> runs = folder.complete_runs();
   for (const auto& path : folder.reference_runs()) runs.push_back(path);
   for (const auto& path : runs) {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -82,11 +83,24 @@ struct CampaignState {
 /// Compares the SHA-256 of every accepted run; one line for each that is missing or changed.
 [[nodiscard]] std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state);
 
+/// File name → SHA-256 of the accepted runs of the campaign in whose runs/ this file lies; empty: no journal there.
+[[nodiscard]] std::map<std::string, std::string> digests_beside(const std::filesystem::path& run);
+/// Throws DataRejected if the run is not as it was written: by these digests, or, if they do not name it, by the
+/// checksums in the file itself.
+void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, std::string>& digests);
+
 /// Renames the unaccepted files of a killed program in runs/, never over another file: `.h5.part` to
 /// `.interrupted.h5.part`, a complete file that is not in the journal to `.unaccepted.h5`. Returns the new names,
 /// relative to the folder. Throws RecordError.
 std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const CampaignState& state,
                                              FileLayer& files = disk());
+
+/// The files beside the runs against the journal: tables, and the copies of the campaign's own files.
+struct FilesBeside {
+  std::vector<std::string> problems;  ///< missing or changed; one line each, with the file's name
+  std::vector<std::string> remarks;   ///< tables that were not written again after the last run, by a program that died
+};
+[[nodiscard]] FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& journal);
 
 struct CampaignVerification {
   std::size_t entries = 0;            ///< of the journal
@@ -97,7 +111,8 @@ struct CampaignVerification {
   [[nodiscard]] bool whole() const { return problems.empty(); }
 };
 
-/// Checks the journal's checksums, every run by itself and by its SHA-256 in the journal, and runs missing in either.
+/// Checks the journal's checksums, every run by itself and by its SHA-256 in the journal, runs missing in either, the
+/// files beside them, and what was fitted by its SHA256SUMS.
 [[nodiscard]] CampaignVerification verify_campaign(const CampaignFolder& folder);
 
 }  // namespace kphi::results

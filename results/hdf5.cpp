@@ -53,13 +53,11 @@ Handle fixed_text(std::size_t size) {
   return type;
 }
 
-Handle utf8_text(std::size_t size) {
-  Handle type = fixed_text(size);
+Handle text_type() {
+  Handle type = fixed_text(H5T_VARIABLE);
   check(H5Tset_cset(type.get(), H5T_CSET_UTF8), "text type");
   return type;
 }
-
-Handle text_type() { return utf8_text(H5T_VARIABLE); }
 
 Handle scalar_space() { return own(H5Screate(H5S_SCALAR), "scalar"); }
 
@@ -115,7 +113,7 @@ Handle type_of(Stored stored) {
                            H5T_STD_U64LE, H5T_IEEE_F64LE, H5T_STD_I32LE};
   static_assert(static_cast<std::size_t>(Stored::text) == numbers.size(), "in the order of Stored");
   if (stored != Stored::text) return own(H5Tcopy(numbers[static_cast<std::size_t>(stored)]), "type");
-  Handle type = utf8_text(kEventTextBytes);
+  Handle type = fixed_text(kEventTextBytes);  // not said to be UTF-8: Octave would refuse the whole file
   check(H5Tset_strpad(type.get(), H5T_STR_NULLPAD), "text type");
   return type;
 }
@@ -184,6 +182,8 @@ Handle create_group(const Handle& parent, const char* name) {
   return own(H5Gcreate2(parent.get(), name, H5P_DEFAULT, list.get(), H5P_DEFAULT),
              fmt::format("create group {}", name));
 }
+
+bool has_dataset(const Handle& group, const char* name) { return H5Lexists(group.get(), name, H5P_DEFAULT) > 0; }
 
 Handle open_group(const Handle& parent, const char* name) {
   return own(H5Gopen2(parent.get(), name, H5P_DEFAULT), fmt::format("open group {}", name));
@@ -298,6 +298,7 @@ void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
 ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file)
     : doing_(fmt::format("{}: read {}", file, name)), type_(type_of(stored)), row_bytes_(bytes_of(stored)) {
   dataset_ = own(H5Dopen2(group.get(), name, without_cache()), doing_);
+  if (stored == Stored::text) type_ = own(H5Dget_type(dataset_.get()), doing_);  // of whatever character set
   space_ = own(H5Dget_space(dataset_.get()), doing_);
   const int rank = H5Sget_simple_extent_ndims(space_.get());
   if (rank < 1 || rank > 2) throw RecordError(doing_ + ": not one- or two-dimensional");

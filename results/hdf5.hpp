@@ -44,6 +44,7 @@ void check(herr_t status, const std::string& doing);
 [[nodiscard]] Handle open_file(const std::filesystem::path& path);
 [[nodiscard]] Handle create_group(const Handle& parent, const char* name);
 [[nodiscard]] Handle open_group(const Handle& parent, const char* name);
+[[nodiscard]] bool has_dataset(const Handle& group, const char* name);
 /// The file's descriptor, for fdatasync.
 [[nodiscard]] int descriptor_of(const Handle& file);
 /// Size of the file in bytes once HDF5 has written everything it holds back.

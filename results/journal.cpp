@@ -35,6 +35,7 @@ std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, st
   } catch (const nlohmann::json::exception& error) {
     return error.what();
   }
+  if (!entry.data.is_object()) return "has data that are no object";
   if (entry.n != n) return fmt::format("has number {} where {} was expected", entry.n, n);
   check = stored;
   return std::nullopt;
@@ -42,19 +43,24 @@ std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, st
 
 }  // namespace
 
-JournalReading read_journal(const std::filesystem::path& path) {
-  const std::string text = read_text(path);
+JournalReading read_journal(const std::filesystem::path& path) { return parse_journal(read_text(path), path.string()); }
+
+std::string chained_line(const std::string& check, std::string_view object) {
+  return fmt::format("{}{}{}\"}}\n", object, kCheckKey, check_of(check, object));
+}
+
+JournalReading parse_journal(std::string_view text, const std::string& path) {
   JournalReading reading;
   while (reading.whole_bytes < text.size()) {
     const std::size_t begin = reading.whole_bytes, end = text.find('\n', begin);
-    const std::string_view line = std::string_view(text).substr(begin, end - begin);
+    const std::string_view line = text.substr(begin, end - begin);
     reading.torn_last_line =
         end == std::string::npos || (end + 1 == text.size() && line.find('\0') != std::string_view::npos);
     if (reading.torn_last_line) break;
     JournalEntry entry;
     const std::uint64_t n = reading.entries.size() + 1;
     if (const auto problem = parse_line(line, n, reading.check, entry)) {
-      reading.problems.push_back(fmt::format("{}:{}: {}", path.string(), n, *problem));
+      reading.problems.push_back(fmt::format("{}:{}: {}", path, n, *problem));
       break;
     }
     reading.entries.push_back(std::move(entry));
@@ -81,7 +87,7 @@ void Journal::append(const std::string& event, const nlohmann::json& data, Nanos
   std::string line = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   line.pop_back();
   const std::string check = check_of(found_.check, line);
-  line += fmt::format("{}{}\"}}\n", kCheckKey, check);
+  line = chained_line(found_.check, line);
   if (spoilt_) throw RecordError(path_.string() + ": an earlier line was not written completely; see the first error");
   try {
     on_disk(path_.string(), [&] {

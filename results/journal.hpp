@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/descriptor.hpp"
@@ -21,6 +22,8 @@ inline constexpr const char* kRunAborted = "run_aborted";
 inline constexpr const char* kCampaignStarted = "campaign_started";
 inline constexpr const char* kCampaignResumed = "campaign_resumed";
 inline constexpr const char* kCampaignFinished = "campaign_finished";
+/// Data: {"files": {"steps.csv": "SHA-256", …}}, after each run that is accepted.
+inline constexpr const char* kTablesWritten = "tables_written";
 
 struct JournalEntry {
   std::uint64_t n = 0;      ///< 1, 2, 3 …
@@ -41,6 +44,12 @@ struct JournalReading {
 
 /// Throws RecordError when the file cannot be read.
 [[nodiscard]] JournalReading read_journal(const std::filesystem::path& path);
+/// The same of its text; `path` only names it in messages.
+[[nodiscard]] JournalReading parse_journal(std::string_view text, const std::string& path);
+
+/// A line of the journal, with its end: `object`, an object of JSON without its last brace, and the check that follows
+/// from it and the `check` of the line before.
+[[nodiscard]] std::string chained_line(const std::string& check, std::string_view object);
 
 /// Appends to a journal. One thread. Failures throw RecordError.
 class Journal {

@@ -139,4 +139,17 @@ struct RunRecording : RunEnding {
   std::vector<StreamEvent> events;  ///< in the order in which they were noticed
 };
 
+/// A row of the group /plot.
+struct PlotRow {
+  double time_s = 0;       ///< bench time
+  double thrust_n = 0;     ///< zero subtracted; NaN: no samples
+  double speed_rad_s = 0;  ///< NaN: no reading before it, or none after it
+};
+
+/// What a finished run file holds for readers that do not have kphi's clock.
+struct RunViews {
+  std::vector<Nanoseconds> sample_times;  ///< bench time of each load-cell record; empty: not written
+  std::vector<PlotRow> plot;              ///< empty: not written
+};
+
 }  // namespace kphi::results

@@ -114,6 +114,14 @@ inline constexpr std::array kLoadCell{
     column<&LoadCellRecord::status>("status", "1", "status word of the box"),
     column<&LoadCellRecord::arrival_ns>("t_arrival_ns", "ns", "receive stamp of the datagram, bench time"),
 };
+/// Written when the run ends: the whole stream tells the clock of the box.
+inline constexpr ColumnLayout kSampleTime{"t_ns", "ns", "time of the sample by the clock of the box, bench time",
+                                          Stored::i64};
+inline constexpr std::array kPlot{
+    column<&PlotRow::time_s>("time", "s", "bench time"),
+    column<&PlotRow::thrust_n>("thrust", "N", "thrust, zero subtracted"),
+    column<&PlotRow::speed_rad_s>("speed", "rad s-1", "speed, positive in the direction of the spin"),
+};
 inline constexpr std::array kMotor{
     column<&MotorReading::value>("value", nullptr, "value of the channel"),
     column<&MotorReading::time_ns>("t_ns", "ns", "midpoint of request and reply, bench time"),
@@ -150,6 +158,8 @@ inline constexpr std::size_t kReadingChunk = 1024;
 
 inline constexpr RunGroup<LoadCellRecord> kLoadCellGroup{"load_cell", "Net Box records as received", kSampleChunk,
                                                          "t_arrival_ns", layout::kLoadCell};
+inline constexpr RunGroup<PlotRow> kPlotGroup{"plot", "thrust and speed over time, means of 10 ms", kReadingChunk,
+                                              "time", layout::kPlot};
 inline constexpr RunGroup<PhaseMark> kCommandGroup{"commands", "what the runner asked for", 64, "t_ns",
                                                    layout::kCommands};
 inline constexpr RunGroup<StreamEvent> kEventGroup{

@@ -163,8 +163,29 @@ void check_columns(const Handle& parent, const RunGroup<Row>& layout, Problems& 
   }
 }
 
+/// Of the samples, if they were written: as many as valid rows, intact, and increasing.
+void check_sample_times(const Handle& root, Problems& problems) {
+  const Handle group = hdf5::open_group(root, kLoadCellGroup.name);
+  if (!hdf5::has_dataset(group, layout::kSampleTime.name)) return;
+  ColumnReader column(group, layout::kSampleTime.name, layout::kSampleTime.stored, kLoadCellGroup.name);
+  if (column.rows() == 0) return;
+  std::uint64_t n_valid = 0;
+  std::uint32_t crc = 0;
+  hdf5::read_attribute(group, "n_valid", n_valid);
+  hdf5::read_attribute(column.dataset(), "crc32", crc);
+  std::vector<Nanoseconds> times(column.rows());
+  column.read(0, times.size(), times.data());
+  if (times.size() != n_valid)
+    problems.push_back(fmt::format("load_cell/t_ns has {} rows, n_valid is {}", times.size(), n_valid));
+  if (column.crc() != crc) problems.emplace_back("load_cell/t_ns does not match its checksum");
+  if (std::ranges::adjacent_find(times, std::greater_equal()) != times.end())
+    problems.emplace_back("load_cell/t_ns does not increase");
+}
+
 void check_all_columns(const Handle& root, Problems& problems) {
   check_columns(root, kLoadCellGroup, problems);
+  check_sample_times(root, problems);
+  if (hdf5::has_attribute(root, "default")) check_columns(root, kPlotGroup, problems);
   const Handle motor = hdf5::open_group(root, "motor");
   for (const MotorChannelInfo& info : kMotorChannels) check_columns(motor, motor_group(info), problems);
   check_columns(root, kCommandGroup, problems);

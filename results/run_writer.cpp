@@ -23,7 +23,9 @@ using hdf5::Handle;
 template <class Row>
 class Series {
  public:
-  Series(const Handle& parent, const RunGroup<Row>& layout, FileLayer& files, const std::string& file)
+  /// `late`: a column that late() fills at the end.
+  Series(const Handle& parent, const RunGroup<Row>& layout, FileLayer& files, const std::string& file,
+         const ColumnLayout* late = nullptr)
       : layout_(layout), group_(hdf5::create_group(parent, layout.name)) {
     hdf5::write_attribute(group_, "long_name", std::string(layout.long_name));
     hdf5::write_attribute(group_, "n_valid", std::uint64_t{0});
@@ -32,6 +34,7 @@ class Series {
       columns_.emplace_back(group_, column, layout.chunk_rows, files, file);
       if (column.stored == Stored::counts) add_components(files, file);
     }
+    if (late != nullptr) late_.emplace(group_, *late, layout.chunk_rows, files, file);
     add_scales();
   }
   void append(std::span<const Row> rows) {
@@ -48,7 +51,12 @@ class Series {
     for (hdf5::Column& column : columns_) column.flush();
     for (hdf5::Column& column : columns_) column.write_crc();
     if (components_) components_->flush();
+    if (!late_ || late_->rows() == 0) return;
+    late_->flush();
+    late_->write_crc();
   }
+  [[nodiscard]] hdf5::Column& late() { return *late_; }
+  [[nodiscard]] const Handle& group() const { return group_; }
   /// Only when what flush() wrote is on disk: HDF5 writes its metadata in any order.
   void declare_valid() { hdf5::write_attribute(group_, "n_valid", rows()); }
   [[nodiscard]] std::uint64_t rows() const { return columns_.front().rows(); }
@@ -72,6 +80,7 @@ class Series {
       if (!is_time) uses.push_back({&dataset, 0});
       if (layout_.columns[i].stored == Stored::counts) second.push_back({&dataset, 1});
     }
+    if (late_) uses.push_back({&late_->dataset(), 0});
     hdf5::make_scale(*time, layout_.time, uses);
     if (components_) hdf5::make_scale(components_->dataset(), "component", second);
     for (const hdf5::ScaleUse& use : uses) {
@@ -83,7 +92,7 @@ class Series {
   RunGroup<Row> layout_;
   Handle group_;
   std::deque<hdf5::Column> columns_;
-  std::optional<hdf5::Column> components_;
+  std::optional<hdf5::Column> components_, late_;
   std::array<std::byte, 12288> block_;
 };
 
@@ -108,7 +117,7 @@ std::filesystem::path prepared_part(const std::filesystem::path& final_path, Fil
 struct RunWriter::File {
   File(const std::filesystem::path& path, const RunHeader& header, FileLayer& files)
       : root(hdf5::create_file(path)),
-        load_cell(root, kLoadCellGroup, files, path.string()),
+        load_cell(root, kLoadCellGroup, files, path.string(), &layout::kSampleTime),
         motor(hdf5::create_group(root, "motor")),
         commands(root, kCommandGroup, files, path.string()),
         events(root, kEventGroup, files, path.string()),
@@ -126,6 +135,7 @@ struct RunWriter::File {
     each(commands);
     each(events);
     each(supply);
+    if (plot) each(*plot);
   }
 
   Handle root;
@@ -135,6 +145,7 @@ struct RunWriter::File {
   Series<PhaseMark> commands;
   Series<StreamEvent> events;
   Series<SupplyReading> supply;
+  std::optional<Series<PlotRow>> plot;
 };
 
 /// Runs every operation on the open file. After the first failure nothing more may reach the disk: partial writes of
@@ -222,8 +233,27 @@ void RunWriter::close() {
   hdf5::check(H5Fclose(root), path_.string() + ": close");
 }
 
-std::string RunWriter::finish(const RunEnding& ending) {
+void RunWriter::add(const RunViews& views) {
+  file_->load_cell.late().append(views.sample_times.data(), views.sample_times.size());
+  if (views.plot.empty()) return;
+  const Series<PlotRow>& plot = file_->plot.emplace(file_->root, kPlotGroup, files_, path_.string());
+  file_->plot->append(views.plot);
+  // NeXus: what a viewer draws when it opens the file.
+  hdf5::write_attribute(file_->root, "default", std::string(kPlotGroup.name));
+  hdf5::write_attribute(plot.group(), "NX_class", std::string("NXdata"));
+  hdf5::write_attribute(plot.group(), "signal", std::string("thrust"));
+  hdf5::write_attribute(plot.group(), "axes", std::string(kPlotGroup.time));
+}
+
+std::string RunWriter::finish(const RunEnding& ending, const Views& views) {
   guarded([&] {
+    if (views) {
+      secure([] {});
+      LoadCellColumns cell;
+      RunRecording run = read_run(path_, cell);
+      static_cast<RunEnding&>(run) = ending;
+      add(views(run, cell));
+    }
     secure([&] {
       const Handle& root = file_->root;
       for_each_figure(ending, [&](const char* name, const auto& value) { hdf5::write_attribute(root, name, value); });
@@ -256,8 +286,8 @@ std::string RunWriter::finish(const RunEnding& ending) {
 }
 
 std::uint64_t RunWriter::bytes_needed(std::uint64_t samples, std::uint64_t readings) {
-  constexpr std::uint64_t kFixed = 4u << 20;  // chunks begun, header, attributes
-  return kFixed + (samples * 44 + readings * 24) * 21 / 20;
+  constexpr std::uint64_t kFixed = 4u << 20;                 // chunks begun, header, attributes
+  return kFixed + (samples * 53 + readings * 24) * 21 / 20;  // with the time of each sample, and the plot
 }
 
 }  // namespace kphi::results

@@ -6,11 +6,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 
 #include "results/file_layer.hpp"
+#include "results/load_cell_columns.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {
@@ -34,8 +36,9 @@ class RunWriter {
 
   /// Closes and syncs, reopens and verifies, makes read-only, renames `.part` to `.h5` (aborted: `.aborted.h5`, or
   /// `.aborted-2.h5` …), and syncs the folder. Returns the file's SHA-256. Throws if a complete run fails the
-  /// verification; its .part stays.
-  [[nodiscard]] std::string finish(const RunEnding& ending);
+  /// verification; its .part stays. `views` is asked first, for what of the whole run goes into the file, too.
+  using Views = std::function<RunViews(const RunRecording&, const LoadCellColumns&)>;
+  [[nodiscard]] std::string finish(const RunEnding& ending, const Views& views = {});
 
   /// Current file: the .part, after finish() the final one.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -51,6 +54,7 @@ class RunWriter {
   void guarded(Action&& action);
   template <class Declare>
   void secure(Declare&& declare);
+  void add(const RunViews& views);
   void close();
   std::filesystem::path final_path_;
   std::filesystem::path path_;

@@ -278,6 +278,12 @@ Coefficients::Row read_row(const Value& map, double scale) {
   return row;
 }
 
+Coefficients::Torque read_torque(const Value& map) {
+  const Coefficients::Torque row{from_degrees(map.at("phi_deg").number()), map.at("k_q").number(), map.number_at("u")};
+  if (!(row.k_q > 0)) map.at("k_q").refuse("a drag torque must be positive", kFitAgain);
+  return row;
+}
+
 void read_propeller(const Value& map, Coefficients::Propeller& into) {
   into.id = map.at("id").text();
   into.name = map.text_at("name");
@@ -306,6 +312,15 @@ void read_provenance(const Value& map, Coefficients::Provenance& into) {
     into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
 }
 
+/// K_T is the k of the table at φ = 0, to the rounding of a hand that wrote it.
+void refuse_other_k_t(const Value& top, const Coefficients& coefficients) {
+  constexpr double kRounding = 1e-3;
+  const double k_t = coefficients.curve.thrust_coefficient().value();
+  for (const Coefficients::Row& row : coefficients.table)
+    if (row.occlusion.value() == 0.0 && !(std::fabs(row.k.value() / k_t - 1.0) < kRounding))
+      top.map_at("K_T").refuse("K_T is not the k of the table at phi_deg 0", kFitAgain);
+}
+
 }  // namespace
 
 Coefficients parse_coefficients(const std::string& text, const std::string& path) {
@@ -331,6 +346,10 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   read_propeller(top.map_at("propeller"), coefficients.propeller);
   for (const Value& row : top.rows("table", "a row of the table has no keys"))
     coefficients.table.push_back(read_row(row, scale));
+  refuse_other_k_t(top, coefficients);
+  if (top.find("torque"))
+    for (const Value& row : top.rows("torque", "a row of the torques has no keys"))
+      coefficients.torque.push_back(read_torque(row));
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
   coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())

@@ -51,6 +51,12 @@ struct Coefficients {
     std::optional<Uncertainty> uncertainty;
     std::optional<RadPerSec> at_speed;  ///< the single speed of the file's k_at_speed
   };
+  /// Drag torque of one occlusion.
+  struct Torque {
+    Radians occlusion;
+    double k_q = 0;           ///< N m/(rad/s)², magnitude
+    std::optional<double> u;  ///< standard uncertainty of k_q
+  };
   struct Run {
     std::string file;
     std::string sha256;
@@ -84,6 +90,7 @@ struct Coefficients {
   std::optional<RadPerSec> slowest_speed;         ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
+  std::vector<Torque> torque;  ///< ascending φ; empty if it was not measured
   std::optional<double> air_density_kg_m3, air_density_u_kg_m3;
   Provenance provenance;
 };

@@ -92,10 +92,16 @@ void CampaignReview::sort() {
   std::ranges::stable_sort(references_, by_key);
 }
 
-void CampaignReview::write(const results::CampaignFolder& folder, results::FileLayer& files) const {
-  results::write_steps(folder.steps(), steps_, files);
-  results::write_steps(folder.means(), means_of(steps_), files);
-  if (!references_.empty()) results::write_steps(folder.references(), references_, files);
+void CampaignReview::write(const results::CampaignFolder& folder, results::FileLayer& files) {
+  json digests;
+  const auto write = [&](const std::filesystem::path& table, std::span<const StepMean> steps) {
+    results::write_steps(table, steps, files);
+    digests[table.filename().string()] = results::sha256_of_file(table);
+  };
+  write(folder.steps(), steps_);
+  write(folder.means(), means_of(steps_));
+  if (!references_.empty()) write(folder.references(), references_);
+  note_(results::kTablesWritten, {{"files", digests}});
 }
 
 int CampaignReview::repetitions(double occlusion_deg) const {

@@ -27,8 +27,9 @@ class CampaignReview {
   void restore(const std::vector<results::StepMean>& means);
   /// The means of a run that was just accepted. `run`: its file's name.
   void add(const std::string& run, const std::vector<results::StepMean>& means);
-  /// steps.csv, means.csv and, with reference runs, references.csv: the same whatever the order of the runs.
-  void write(const results::CampaignFolder& folder, results::FileLayer& files) const;
+  /// steps.csv, means.csv and, with reference runs, references.csv: the same whatever the order of the runs. Their
+  /// SHA-256 goes into the journal.
+  void write(const results::CampaignFolder& folder, results::FileLayer& files);
   /// Once all planned repetitions of the occlusion are there: the question to ask if they disagree and the campaign
   /// allows another run.
   [[nodiscard]] std::optional<AnotherRun> another(double occlusion_deg);

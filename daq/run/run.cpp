@@ -12,6 +12,7 @@
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/recorder.hpp"
 #include "daq/run/sequence.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_writer.hpp"
 #include "results/version.hpp"
 
@@ -196,12 +197,12 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   results::RunEnding ending{
       results::Outcome::complete, "", account, bench.load_cell().health(), bench.motor().counts() - counts_before,
       sequence.box_bias()};
-  if (!ended.cause) return {order.file, writer.finish(ending), account, sequence.stop()};
+  if (!ended.cause) return {order.file, writer.finish(ending, results::views_of), account, sequence.stop()};
 
   ending.outcome = results::Outcome::aborted;
   ending.outcome_reason = ended.words.line();
   try {
-    (void)writer.finish(ending);
+    (void)writer.finish(ending, results::views_of);
   } catch (const RecordError&) {
     // The first cause matters more; the .part file stays as it was last synced.
   }

@@ -25,6 +25,20 @@ constexpr sim::Peer kHost = 1;
 /// Neighbouring keys give unrelated streams.
 std::uint64_t mixed(std::uint64_t key) noexcept { return SplitMix64(key)(); }
 
+/// Of one repetition; 0: of all. `plant` has the law of the nominal propellers.
+void take_stand(const profiles::SimulatedStand& stand, int repetition, sim::PlantParameters& plant) {
+  if (stand.law) plant.stand.law = {stand.law->K_T, stand.law->intercept, stand.law->slope_per_deg};
+  plant.stand.bend = stand.bend;
+  plant.stand.rise_per_krad_s = stand.rise_per_krad_s;
+  plant.stand.mounting = stand.mounting;
+  for (const auto& plate : stand.plates)
+    if (plate.repetition.value_or(repetition) == repetition)
+      plant.stand.plates.push_back({plate.named_deg, plate.true_deg});
+  if (stand.zero_walk_n) plant.load_cell.walk_per_root_minute[2] = *stand.zero_walk_n;
+  plant.load_cell.slow_noise = stand.slow_noise_n;
+  plant.load_cell.slow_noise_seconds = stand.slow_noise_s;
+}
+
 /// Throws DeviceError, as the true transport would.
 std::string body_of(const std::string& response, const std::string& operation) {
   const std::size_t blank = response.find("\r\n\r\n");
@@ -36,7 +50,7 @@ std::string body_of(const std::string& response, const std::string& operation) {
 
 }  // namespace
 
-sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings settings) {
+sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings settings, int repetition) {
   settings.netbox.rate_hz = config.netbox.rate_hz;
   settings.netbox.records_per_datagram = config.netbox.records_per_datagram;
   settings.module.module_id = config.iq.module_id;
@@ -45,6 +59,7 @@ sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::B
   if (!config.simulation) return settings;
   settings.seed = config.simulation->seed;
   settings.plant.air_density_kg_m3 = config.simulation->air_density_kg_m3;
+  take_stand(config.simulation->stand, repetition, settings.plant);
   const std::string &faults = config.simulation->faults, &motor = config.simulation->motor;
   if (!faults.empty()) sim::load_faults(profiles::read_text(faults), faults, settings);
   if (!motor.empty()) {
@@ -89,7 +104,7 @@ void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
 
 void DeterministicBench::begin_run(const RunBeginning& run) {
   if (lives_ == Lives::whole_campaign) return;
-  sim::BenchSettings settings = simulated_devices(config_, other_);
+  sim::BenchSettings settings = simulated_devices(config_, other_, run.repetition);
   settings.begin = run.after;
   settings.seed = mixed(mixed(mixed(settings.seed) ^ std::bit_cast<std::uint64_t>(run.occlusion_deg)) ^
                         static_cast<std::uint64_t>(run.repetition));

@@ -35,8 +35,10 @@ struct BenchWitness {
 };
 
 /// The simulated devices of a bench file, its fault script and motor included. `other`: what no bench file says of
-/// them. Throws ConfigurationError when script or motor cannot be used.
-[[nodiscard]] sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings other = {});
+/// them. `repetition`: of the run that they live for; 0: the whole campaign. Throws ConfigurationError when script or
+/// motor cannot be used.
+[[nodiscard]] sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::BenchSettings other = {},
+                                                   int repetition = 0);
 
 class DeterministicBench final : public Bench, private LoadCellLink {
  public:

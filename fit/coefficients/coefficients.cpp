@@ -7,11 +7,13 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/units.hpp"
+#include "results/checksums.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -228,7 +230,7 @@ std::string format_coefficients(const Fitted& fitted, const Provenance& provenan
   for (std::size_t i = 0; i < identification.table.size(); ++i) text += table_row(fitted, i);
   text += provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
   (void)compensation::parse_coefficients(text, "coefficients.yaml");  // what cannot be read again is not written
-  return text;
+  return results::sealed(std::move(text));
 }
 
 RecordedFit read_recorded_fit(const std::string& path) {
@@ -259,6 +261,7 @@ RecordedFit read_recorded_fit(const std::string& path) {
   if (!fit.bench) return record;
   record.bench.emplace();
   for (const auto& [name, value] : *fit.bench) set_uncertainty(*record.bench, name + "=" + shortest(value));
+  options.mounting = record.bench->mounting;
   return record;
 }
 

@@ -9,6 +9,7 @@
 #include <ostream>
 
 #include "fit/export/mcap_writer.hpp"
+#include "results/reduction/clock_map.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -29,14 +30,16 @@ void write_load_cell(const results::RunRecording& run, std::uint64_t epoch, Mcap
   std::vector<const char*> names(kAxes.begin(), kAxes.end());
   names.insert(names.end(), {"ft_sequence", "status"});
   const auto channel = writer.add_channel("/load_cell", "kphi.LoadCell", schema_of(names));
+  const std::vector<Nanoseconds> times = results::sample_times(run);
   std::string json;
-  for (const LoadCellRecord& record : run.load_cell) {
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const LoadCellRecord& record = run.load_cell[i];
     json.assign(1, '{');
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
       fmt::format_to(std::back_inserter(json), "\"{}\":{:.7g},", kAxes[axis],
                      physical(record, run.header.load_cell, axis));
     fmt::format_to(std::back_inserter(json), "\"ft_sequence\":{},\"status\":{}}}", record.ft_sequence, record.status);
-    writer.write(channel, epoch + static_cast<std::uint64_t>(record.arrival_ns), json);
+    writer.write(channel, epoch + static_cast<std::uint64_t>(times[i]), json);
   }
 }
 
@@ -98,9 +101,11 @@ std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostre
   out << "time_s";
   for (const char* axis : kAxes) out << ',' << axis;
   out << ",ft_sequence,status\n";
+  const std::vector<Nanoseconds> times = results::sample_times(run);
   std::string row;
-  for (const LoadCellRecord& record : run.load_cell) {
-    row = fmt::format("{:.9f}", 1e-9 * static_cast<double>(record.arrival_ns));
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const LoadCellRecord& record = run.load_cell[i];
+    row = fmt::format("{:.9f}", 1e-9 * static_cast<double>(times[i]));
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
       fmt::format_to(std::back_inserter(row), ",{:.7g}", physical(record, run.header.load_cell, axis));
     fmt::format_to(std::back_inserter(row), ",{},{}\n", record.ft_sequence, record.status);

@@ -9,10 +9,11 @@
 
 namespace kphi::fit {
 
-/// Topics /load_cell (N, N m), /motor/<channel> and /phase at the times of their records since 1970.
+/// Topics /load_cell (N, N m), /motor/<channel> and /phase at their times since 1970; a sample of the load cell at its
+/// own, by the box's clock (results::sample_times).
 std::vector<std::string> run_to_mcap(const results::RunRecording& run, std::ostream& out);
 
-/// time_s,force_x_n,…,torque_z_nm,ft_sequence,status: the load cell alone.
+/// time_s,force_x_n,…,torque_z_nm,ft_sequence,status: the load cell alone, each sample at its own time.
 std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostream& out);
 
 /// "2021-05-30T08:00:00Z" in ns since 1970, UTC; 0 for any other text.

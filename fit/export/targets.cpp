@@ -8,16 +8,20 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "fit/export/mcap_writer.hpp"
+#include "fit/numerics/hypothesis_test.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 /// K_T k_i(φ), as it flies (ScalingLaw::clamped), N/(rad/s)². Throws ConfigurationError for a φ beyond the file's.
 double coefficient_at(const compensation::Coefficients& file, double phi_deg) {
@@ -35,6 +39,44 @@ double speed_max_of(const compensation::Coefficients& file, const ExportOptions&
   throw ConfigurationError(file.path +
                            ": no range of speeds in the file; give the speed at full output with --speed-max-rpm");
 }
+
+/// Torque per thrust, m, with its standard uncertainty.
+struct TorquePerThrust {
+  double value = 0;
+  std::optional<double> u;
+};
+
+/// Of a rotor at this φ: drag torque between the measured occlusions, over K_T k_i. nullopt: not measured.
+std::optional<TorquePerThrust> torque_per_thrust(const compensation::Coefficients& file, double phi_deg) {
+  if (file.torque.empty()) return std::nullopt;
+  const double phi = from_degrees(phi_deg).value();
+  const auto above = std::ranges::find_if(file.torque, [&](const auto& row) { return row.occlusion.value() >= phi; });
+  const auto& right = above == file.torque.end() ? file.torque.back() : *above;
+  const auto& left = above == file.torque.begin() || above == file.torque.end() ? right : *(above - 1);
+  const double width = (right.occlusion - left.occlusion).value();
+  const double part = width > 0 ? (phi - left.occlusion.value()) / width : 0;
+  const double k_q = left.k_q + part * (right.k_q - left.k_q), k = coefficient_at(file, phi_deg);
+  TorquePerThrust result{k_q / k, std::nullopt};
+  if (left.u && right.u && file.thrust_coefficient)
+    result.u = result.value * std::hypot(std::max(*left.u, *right.u) / k_q,
+                                         file.thrust_coefficient->u / file.curve.thrust_coefficient().value());
+  return result;
+}
+
+/// "0.01226 ± 0.00009 m (95 %)".
+std::string words_of(const TorquePerThrust& torque) {
+  return torque.u ? fmt::format("{:.4g} ± {:.2g} m (95 %)", torque.value, coverage_factor(kEndless, 0.95) * *torque.u)
+                  : fmt::format("{:.4g} m", torque.value);
+}
+
+/// Throws ConfigurationError unless there is one direction for each motor, or none at all.
+void require_turns(const ExportOptions& options) {
+  if (options.turns.empty() || options.turns.size() == static_cast<std::size_t>(options.motors)) return;
+  throw ConfigurationError(fmt::format("--turns names {} motors, but there are {}; name each, or set --motors",
+                                       options.turns.size(), options.motors));
+}
+
+constexpr const char* kNoTorque = "torque: the coefficient file has none; measure it with the load cell's torque axis";
 
 /// Control characters become blanks.
 std::string one_line(std::string text) {
@@ -182,6 +224,18 @@ std::map<std::string, std::string> provenance(const compensation::Coefficients& 
 
 }  // namespace
 
+std::vector<Turn> parse_turns(const std::string& text) {
+  std::vector<Turn> turns;
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    if (word != "ccw" && word != "cw")
+      throw ConfigurationError(
+          fmt::format("--turns {}: \"{}\" is neither cw nor ccw; name each motor, such as ccw,ccw,cw,cw", text, word));
+    turns.push_back(word == "cw" ? Turn::clockwise : Turn::counter_clockwise);
+  }
+  return turns;
+}
+
 /// T = c2 ω² + c1 ω + c0, ω in rad/s: `thrust_map: [c2, c1, c0]` of a quadrotor file.
 Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options) {
   Export result;
@@ -190,16 +244,22 @@ Export to_agilicious(const compensation::Coefficients& file, const ExportOptions
                             options.phi_deg, yaml_number(coefficient_at(file, options.phi_deg)));
   if (options.speed_max_rpm || file.fastest_speed)
     result.text += fmt::format("motor_omega_max: {}  # rad/s\n", yaml_number(speed_max_of(file, options)));
+  const auto kappa = torque_per_thrust(file, options.phi_deg);
+  if (kappa)
+    result.text += fmt::format("kappa: {}  # torque per thrust, {}\n", yaml_number(kappa->value), words_of(*kappa));
   if (file.slowest_speed)
     result.text +=
         fmt::format("motor_omega_min: {}  # rad/s, the slowest measured\n", yaml_number(file.slowest_speed->value()));
   result.lost = {no_phi("thrust_map", options.phi_deg),
                  "uncertainties, air density: the file has no keys for them; see its comments"};
+  if (!kappa) result.lost.emplace_back(kNoTorque);
   return result;
 }
 
 /// Parameters as QGroundControl loads them. Control allocation takes thrust = CT u², u the normalised output, so that
 /// CT = k ω_max² in N where the output is proportional to speed (a speed-controlled motor); THR_MDL_FAC = 1 says so.
+/// Torque = KM · thrust, KM in m, negative for a rotor that turns clockwise: a wrong sign would crash the vehicle, so
+/// it is written only where the directions are known.
 Export to_px4(const compensation::Coefficients& file, const ExportOptions& options) {
   constexpr double kLargestCt = 100;  // module.yaml of control_allocator
   constexpr int kReal32 = 9;          // MAV_PARAM_TYPE_REAL32
@@ -209,6 +269,7 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
     throw ConfigurationError(
         fmt::format("{}: {:.1f} N at full output is above 100, the largest CA_ROTORn_CT; no file", file.path, ct));
   }
+  require_turns(options);
   Export result;
   result.text = comment(file, "# ") +
                 fmt::format(
@@ -217,22 +278,36 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
                     options.phi_deg, to_rpm(RadPerSec(speed_max)));
   for (int motor = 0; motor < options.motors; ++motor)
     result.text += fmt::format("1\t1\tCA_ROTOR{}_CT\t{}\t{}\n", motor, shortest(ct), kReal32);
+  const auto moment = torque_per_thrust(file, options.phi_deg);
+  for (std::size_t motor = 0; moment && motor < options.turns.size(); ++motor)
+    result.text +=
+        fmt::format("1\t1\tCA_ROTOR{}_KM\t{}\t{}\n", motor,
+                    shortest(options.turns[motor] == Turn::clockwise ? -moment->value : moment->value), kReal32);
   result.text += fmt::format("1\t1\tTHR_MDL_FAC\t1.0\t{}\n", kReal32);
   result.lost = {no_phi("CA_ROTORn_CT", options.phi_deg),
                  "rad/s: PX4 has only a normalised output; CT is for the speed at full output named above",
                  "uncertainties: PX4 has no such parameters; see its comments"};
+  if (!moment) result.lost.emplace_back(kNoTorque);
+  if (moment && options.turns.empty())
+    result.lost.push_back(
+        fmt::format("CA_ROTORn_KM: {}, negative for a rotor that turns clockwise; name the "
+                    "directions with --turns ccw,ccw,cw,cw to have it written",
+                    words_of(*moment)));
   return result;
 }
 
-/// SDF for gz-sim's MulticopterMotorModel: motorConstant in N/(rad/s)², maxRotVelocity in rad/s. RotorS' motorConstant
-/// is the same number.
+/// SDF for gz-sim's MulticopterMotorModel: motorConstant in N/(rad/s)², momentConstant (torque per thrust) in m,
+/// maxRotVelocity in rad/s. RotorS' motorConstant and momentConstant are the same numbers.
 Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options) {
+  require_turns(options);
   const double k = coefficient_at(file, options.phi_deg);
+  const auto moment = torque_per_thrust(file, options.phi_deg);
   Export result;
   result.text = "<?xml version=\"1.0\"?>\n<sdf version=\"1.9\">\n";
   for (const std::string& line : provenance_lines(file)) result.text += "  <!-- " + xml_comment_safe(line) + " -->\n";
   result.text += fmt::format("  <!-- phi = {:g} deg; motorConstant in N/(rad/s)^2, maxRotVelocity in rad/s -->\n",
                              options.phi_deg);
+  if (moment) result.text += fmt::format("  <!-- momentConstant, torque per thrust: {} -->\n", words_of(*moment));
   result.text += fmt::format("  <model name=\"{}\">\n", html_escaped(one_line(file.propeller.id)));
   for (int motor = 0; motor < options.motors; ++motor) {
     result.text += fmt::format(
@@ -240,15 +315,22 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
         "name=\"gz::sim::systems::MulticopterMotorModel\">\n"
         "      <jointName>rotor_{0}_joint</jointName>\n      <linkName>rotor_{0}</linkName>\n"
         "      <motorNumber>{0}</motorNumber>\n      <motorType>velocity</motorType>\n"
-        "      <motorConstant>{1}</motorConstant>\n      <maxRotVelocity>{2}</maxRotVelocity>\n    </plugin>\n",
+        "      <motorConstant>{1}</motorConstant>\n      <maxRotVelocity>{2}</maxRotVelocity>\n",
         motor, shortest(k), shortest(speed_max_of(file, options)));
+    if (moment) result.text += fmt::format("      <momentConstant>{}</momentConstant>\n", shortest(moment->value));
+    if (!options.turns.empty())
+      result.text += fmt::format("      <turningDirection>{}</turningDirection>\n",
+                                 options.turns[static_cast<std::size_t>(motor)] == Turn::clockwise ? "cw" : "ccw");
+    result.text += "    </plugin>\n";
   }
   result.text += "  </model>\n</sdf>\n";
   result.lost = {
       no_phi("MulticopterMotorModel", options.phi_deg),
-      "torque and time constants: not in the coefficient file; momentConstant, timeConstantUp and timeConstantDown "
-      "keep the plugin's defaults",
-      "names of joints and links, turning directions: rotor_N and the defaults; replace them with the model's"};
+      "time constants: not in the coefficient file; timeConstantUp and timeConstantDown keep the plugin's defaults",
+      "names of joints and links: rotor_N; replace them with the model's"};
+  if (!moment) result.lost.emplace_back(kNoTorque);
+  if (options.turns.empty())
+    result.lost.emplace_back("turning directions: the plugin's default; name them with --turns ccw,ccw,cw,cw");
   return result;
 }
 
@@ -275,8 +357,9 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   add_table(file, parameters);
   Export result;
   result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text;
-  result.lost = {"hashes of the runs: only in the coefficient file",
-                 "the covariance's shape: parameters have no matrices; it is row by row, in the order of the parameters"};
+  result.lost = {
+      "hashes of the runs: only in the coefficient file",
+      "the covariance's shape: parameters have no matrices; it is row by row, in the order of the parameters"};
   if (!parameters.unknown.empty())
     result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown);
   return result;

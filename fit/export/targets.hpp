@@ -1,6 +1,7 @@
 // The coefficients as files for other programs. Each target lists the values that its format cannot store.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,10 +11,17 @@
 
 namespace kphi::fit {
 
+/// Seen from above.
+enum class Turn : std::uint8_t { counter_clockwise, clockwise };
+
+/// "ccw,cw,…". Throws ConfigurationError.
+[[nodiscard]] std::vector<Turn> parse_turns(const std::string& text);
+
 struct ExportOptions {
   double phi_deg = 0;                     ///< for targets with one constant per motor
   std::optional<double> speed_max_rpm{};  ///< at full output; default: the highest speed of the file
   int motors = 4;
+  std::vector<Turn> turns{};  ///< of the motors, in their order; empty: not known
 };
 
 struct Export {
@@ -21,7 +29,8 @@ struct Export {
   std::vector<std::string> lost;  ///< values that the format cannot store, with the reason; one line each
 };
 
-/// Throws ConfigurationError for a φ outside the measured range or an unknown speed at full output.
+/// Throws ConfigurationError for a φ outside the measured range, an unknown speed at full output, or turning directions
+/// of another number of motors.
 [[nodiscard]] Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_px4(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);

@@ -144,19 +144,17 @@ std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, st
   for (const TableRow& row : table.rows) {
     points.push_back({non_negative(table, row, phi), non_negative(table, row, k) * unit,
                       error && !row.fields[*error].empty() ? non_negative(table, row, *error) * unit : 0});
-    if (points.back().phi_deg >= 360) {
-      throw ConfigurationError(
-          fmt::format("{}:{}: phi_deg is {}; it must be below 360", table.path, row.line, points.back().phi_deg));
-    }
   }
   return points;
 }
 
 Import import_table(std::string_view text, const std::string& path, const ImportOptions& options) {
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+    throw ConfigurationError(path + ":1: UTF-16; convert it first: iconv -f UTF-16 -t UTF-8 LOG.csv > NEW.csv");
   Import import = !options.columns.empty()
                       ? import_log(read_columns(text, path, options.columns, options.dialect), options.rows)
                   : is_uiuc(text) ? import_uiuc(text, path, options)
-                                  : import_log(read_rcbenchmark(text, path), options.rows);
+                                  : import_log(read_rcbenchmark(text, path, options.dialect), options.rows);
   for (results::StepMean& step : import.table.steps) {
     if (!options.propeller.empty()) step.propeller = options.propeller;
     if (options.diameter_in) step.diameter_in = *options.diameter_in;
@@ -184,12 +182,16 @@ std::string import_record(const Import& import, std::string_view text, const std
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)
     problems.push_back({{"line", problem.line}, {"what", problem.what}});
+  const ThrustFit fit = fit_thrust(points_of(import.table.steps));
   Json record{{"format", "kphi-import/1"},
               {"source", path},
               {"sha256", results::sha256(text)},
               {"tool_version", tool_version},
               {"thrust_unit", import.table.unit},
               {"rows_used", import.table.steps.size()},
+              {"k_n_s2_per_rad2", fit.parameters.k},
+              {"k_standard_error_n_s2_per_rad2", fit.standard_error.k},
+              {"rms_n", fit.rms_n},
               {"columns_left_out", import.table.unread},
               {"findings", findings},
               {"lines_left_out", problems}};

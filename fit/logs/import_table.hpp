@@ -31,8 +31,8 @@ inline constexpr double kUiucDensityKgM3 = 1.225;
 /// CSV with phi_deg, k and, if known, its standard error: k_n_s2_per_rad2 and u_k_n_s2_per_rad2 in N/(rad/s)², or
 /// k_n_per_rpm2 and u_k_n_per_rpm2 in N/RPM², or k and u_k in `unit`, "N/(rad/s)^2" or "N/RPM^2": the paper's unit is
 /// 91 times larger, so none is assumed. Throws ConfigurationError (path:line) where the unit is not known or given
-/// twice, for a missing column, a line that does not fit, a φ outside [0, 360), or a negative k or u_k (k = 0 is
-/// allowed: a fully blocked propeller).
+/// twice, for a missing column, a line that does not fit, or a negative φ, k or u_k (k = 0 is allowed: a fully
+/// blocked propeller).
 [[nodiscard]] std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, std::string_view unit = {});
 
 struct ImportOptions {

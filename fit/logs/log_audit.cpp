@@ -18,11 +18,11 @@ using results::QualityFlag;
 using Findings = std::vector<LogFinding>;
 using Rows = std::vector<const StandRow*>;
 
-constexpr std::array kNames{
-    "speed_ratio",   "speed_disagrees", "speed_dead",        "speed_spike",   "speed_missing",    "barely_turning",
-    "not_turning",   "coasting",        "current_limit",     "untared",       "zero_missing",     "zero_drifted",
-    "zero_scatters", "negative_thrust", "thrust_frozen",     "thrust_drifts", "correlated_noise", "time_backward",
-    "time_repeated", "other_fields",    "k_unlike_its_group"};
+constexpr std::array kNames{"speed_ratio",    "speed_disagrees",   "speed_dead",    "speed_spike",     "speed_missing",
+                            "barely_turning", "not_turning",       "coasting",      "current_limit",   "untared",
+                            "zero_missing",   "zero_drifted",      "zero_scatters", "negative_thrust", "thrust_frozen",
+                            "thrust_drifts",  "correlated_noise",  "time_backward", "time_repeated",   "not_a_number",
+                            "other_fields",   "k_unlike_its_group"};
 static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::k_unlike_its_group) + 1);
 
 /// Of the steps concerned.
@@ -220,10 +220,12 @@ void audit_zero(const StandLog& log, const std::optional<LogZero>& before, const
     add(findings, FindingKind::zero_missing, log.rows.size(), 0,
         "no rows with the motor off at the beginning: the zero is unknown, and k may be off by a few percent");
   }
+  const double noise = std::max(5e-3 * largest, before ? 3 * before->sd_n : 0);
   double lowest = 0;
   for (const StandRow& row : log.rows) lowest = std::min(lowest, row.thrust_n);
-  add(findings, FindingKind::negative_thrust, rows_where(log, [](const StandRow& row) { return row.thrust_n < 0; }),
-      fmt::format("thrust below 0, down to {:.4f} N", lowest));
+  add(findings, FindingKind::negative_thrust,
+      rows_where(log, [&](const StandRow& row) { return row.thrust_n < -noise; }),
+      fmt::format("thrust below 0 by more than noise, down to {:.4f} N", lowest));
 }
 
 // ---- time series -------------------------------------------------------------------------------------------
@@ -320,6 +322,8 @@ void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std:
 
 const char* name_of(FindingKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 
+bool spoils_k(FindingKind kind) { return kind == FindingKind::thrust_drifts; }
+
 std::optional<PoleRatio> pole_ratio(double ratio) {
   constexpr int kMost = 24;
   constexpr double kTolerance = 2e-3;
@@ -366,6 +370,11 @@ std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection
   if (const std::vector<std::size_t> rows = plateau(log, source); !rows.empty()) {
     audit_drift(log, source, rows, findings);
     audit_noise(log, source, rows, findings);
+  }
+  if (!log.not_numbers.empty()) {
+    add(findings, FindingKind::not_a_number, log.not_numbers.size(), log.not_numbers.front().line,
+        "values left out; the first: " + log.not_numbers.front().what);
+    for (const TableProblem& field : log.not_numbers) findings.back().lines.push_back(field.line);
   }
   if (log.problems.empty()) return findings;
   add(findings, FindingKind::other_fields, log.problems.size(), log.problems.front().line,

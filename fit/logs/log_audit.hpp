@@ -32,12 +32,16 @@ enum class FindingKind : std::uint8_t {
   correlated_noise,    ///< rows of a plateau are not independent
   time_backward,       ///< stamps earlier than the one before
   time_repeated,       ///< equal stamps
+  not_a_number,        ///< fields of a channel that contain something else
   other_fields,        ///< lines that do not fit the header
   k_unlike_its_group,  ///< among files of one propeller
 };
 
 /// "speed_ratio"
 [[nodiscard]] const char* name_of(FindingKind kind);
+
+/// One k for a log with such a finding means nothing.
+[[nodiscard]] bool spoils_k(FindingKind kind);
 
 struct LogFinding {
   FindingKind kind{};

@@ -193,17 +193,33 @@ std::string objection(Role role, double value) {
   return {};
 }
 
+/// "12,5"
+bool has_decimal_comma(const std::string& field) {
+  std::string point = field;
+  std::replace(point.begin(), point.end(), ',', '.');
+  return point != field && parse_number(point).has_value();
+}
+
 /// nullopt, and the reason in the log, if the thrust is not a number or a value is impossible.
 std::optional<StandRow> read_row(const TableRow& fields, const Columns& columns, bool decimal_comma, StandLog& log) {
   StandRow row{.line = fields.line};
   for (const Column& column : columns) {
     std::string field = fields.fields[column.index];
     if (decimal_comma) std::replace(field.begin(), field.end(), ',', '.');
-    const auto value = parse_number(field);
+    auto value = parse_number(field);
+    if (!value && !decimal_comma && has_decimal_comma(field))
+      throw ConfigurationError(
+          fmt::format("{}:{}: \"{}\" has a decimal comma; import with --decimal-comma", log.path, fields.line, field));
+    if (value && !std::isfinite(*value)) value.reset();
     const bool needed = column.role == kThrust || column.role == &StandRow::occlusion_deg;
-    if (!value && !needed) continue;
-    const std::string why = value ? objection(column.role, *value * column.factor)
-                                  : fmt::format("{} is not a number", row_of(column.role).name);
+    const std::string no_number = field.empty()
+                                      ? fmt::format("{} is missing", row_of(column.role).name)
+                                      : fmt::format("{} \"{}\" is not a number", row_of(column.role).name, field);
+    if (!value && !needed) {
+      if (!field.empty()) log.not_numbers.push_back({fields.line, no_number});
+      continue;
+    }
+    const std::string why = value ? objection(column.role, *value * column.factor) : no_number;
     if (!why.empty()) {
       log.problems.push_back({fields.line, why + "; line skipped"});
       return std::nullopt;
@@ -253,6 +269,25 @@ double tare_of(const StandLog& log, const RowSelection& selection, SpeedSource s
                        sd, 100 * sd / largest_thrust(log)));
   }
   return mean(zeros);
+}
+
+/// Most rows with a thrust have no speed: what is left of the log says nothing of its propeller.
+void refuse_blind_speed(const StandLog& log, SpeedSource source) {
+  const double there = std::max(0.05 * largest_thrust(log), from_gram_force(5).value());
+  std::size_t blind = 0, pulling = 0;
+  for (const StandRow& row : log.rows) {
+    if (std::abs(row.thrust_n) < there || (row.throttle_us && *row.throttle_us <= kIdleUs)) continue;
+    ++pulling;
+    if (!(rpm_of(row, source).value_or(0) > 0)) ++blind;
+  }
+  if (2 * blind <= pulling) return;
+  const bool other = source == SpeedSource::electrical ? log.has_optical : log.has_electrical;
+  refuse(log.path,
+         fmt::format("the {} speed reads 0 in {} of {} rows with thrust: its sensor does not see the propeller; {}",
+                     source == SpeedSource::electrical ? "electrical" : "optical", blind, pulling,
+                     !other                              ? "measure again with one that does"
+                     : source == SpeedSource::electrical ? "take the other with --speed optical"
+                                                         : "take the other with --speed electrical"));
 }
 
 results::StepMean step_of(const StandRow& row, const RowSelection& selection, SpeedSource source, double tare_n) {
@@ -341,8 +376,8 @@ StandLog read_columns(std::string_view text, std::string path, const std::vector
   return read_rows(table, mapped, dialect.decimal_comma, {});
 }
 
-StandLog read_rcbenchmark(std::string_view text, std::string path) {
-  const Table table = read_csv(text, std::move(path));
+StandLog read_rcbenchmark(std::string_view text, std::string path, const CsvDialect& dialect) {
+  const Table table = read_csv(text, std::move(path), dialect.separator);
   Columns columns;
   std::vector<std::string> unread;
   for (const KnownChannel& channel : kRcbenchmark) map_channel(table, channel, columns, unread);
@@ -352,7 +387,7 @@ StandLog read_rcbenchmark(std::string_view text, std::string path) {
            "with --column");
   }
   if (!has_speed(columns)) refuse(table, "no column \"Motor Electrical Speed (RPM)\" or \"Motor Optical Speed (RPM)\"");
-  return read_rows(table, columns, false, std::move(unread));
+  return read_rows(table, columns, dialect.decimal_comma, std::move(unread));
 }
 
 results::StepMean step_of_row(double speed_rpm, double thrust_n) {
@@ -403,6 +438,7 @@ ImportedTable select_rows(const StandLog& log, const RowSelection& selection) {
     refuse(log.path, fmt::format("no row with {} speed above {} RPM{}", imported.speed_source,
                                  selection.speed_above_rpm, selection.speed ? "; try the other speed" : ""));
   }
+  refuse_blind_speed(log, source);
   refuse_reversed_thrust(imported.steps, log.path);
   return imported;
 }

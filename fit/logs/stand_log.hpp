@@ -38,8 +38,9 @@ struct StandLog {
   bool has_electrical = false;
   bool has_optical = false;
   std::vector<StandRow> rows{};
-  std::vector<TableProblem> problems{};  ///< lines skipped
-  std::vector<std::string> unread{};     ///< columns skipped, with the reason
+  std::vector<TableProblem> problems{};     ///< lines skipped
+  std::vector<std::string> unread{};        ///< columns skipped, with the reason
+  std::vector<TableProblem> not_numbers{};  ///< values left out of a row that is kept
 };
 
 [[nodiscard]] inline std::optional<double> rpm_of(const StandRow& row, SpeedSource source) {
@@ -88,6 +89,7 @@ struct ColumnRole {
 /// Throws ConfigurationError that lists the roles.
 [[nodiscard]] ColumnRole parse_column_role(std::string_view text);
 
+/// Of a table of any make.
 struct CsvDialect {
   char separator = 0;          ///< 0: the one of , ; tab that the header line has most of
   bool decimal_comma = false;  ///< 1,5 is one and a half
@@ -102,7 +104,7 @@ struct CsvDialect {
 /// A table of a Tyto/RCbenchmark stand (Series 1520, 1580/1585, 1780). Its columns have known names; their units differ
 /// between files. The file does not say which speed is right: the electrical one needs the motor's pole count. Throws
 /// as read_columns does; skips and lists a column in an unknown unit, unless it is the thrust or a speed.
-[[nodiscard]] StandLog read_rcbenchmark(std::string_view text, std::string path);
+[[nodiscard]] StandLog read_rcbenchmark(std::string_view text, std::string path, const CsvDialect& dialect = {});
 
 /// Which rows become steps, and how.
 struct RowSelection {
@@ -137,7 +139,7 @@ struct ImportedTable {
 [[nodiscard]] SpeedSource choose_speed(const StandLog& log, const RowSelection& selection);
 
 /// Throws ConfigurationError (path:line) when the chosen channel is missing, no row is left, the rows for the tare are
-/// too few or scatter too much, or thrust falls with speed (reversed sign).
+/// too few or scatter too much, the speed reads 0 in most rows with thrust, or thrust falls with speed (reversed sign).
 [[nodiscard]] ImportedTable select_rows(const StandLog& log, const RowSelection& selection = {});
 
 /// Σ T ω² must be positive. Throws ConfigurationError at path:1 otherwise.

@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "compensation/units.hpp"
+#include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -76,9 +77,10 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
 }
 
 /// For "k at a speed" only the steps at that speed; otherwise all steps, with the weights of the fit.
-AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed) {
+AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed,
+                        const results::ZeroMovement& movement) {
   if (estimator != Estimator::at_speed) {
-    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k);
+    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k, movement);
     WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
     if (estimator != Estimator::through_origin) {
       // The other terms of the map are fitted too, and their errors are part of the error of k.
@@ -95,7 +97,7 @@ AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, do
     at_level.points[i].weight = there ? 1 / (square * square) : 0;
     at_level.robust_weights[i] = 1;
   }
-  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k), {});
+  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k, movement), {});
 }
 
 void require_one_propeller(std::span<const StepMean> steps) {
@@ -125,8 +127,13 @@ StepsByAngle by_angle(std::span<const StepMean> steps) {
   return result;
 }
 
-/// The curve through the table. Throws FitError if it cannot fly.
+/// The curve through the table, if an occlusion was measured. Throws FitError if it cannot fly.
 Identification with_curve(Identification result) {
+  if (const auto& only = result.table.front(); result.table.size() == 1 && only.phi_deg == 0 && only.fit) {
+    result.curve_fit.K_T = only.k;
+    result.curve_fit.K_T_standard_error = only.standard_error;
+    return result;
+  }
   result.curve_fit = fit_curve(points_of(result.table), result.options.curve);
   (void)result.curve();
   return result;
@@ -175,18 +182,24 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
                                                   double at_speed_rad_s, Repeatability& repeatability) {
   std::vector<OcclusionCoefficient> table;
   std::vector<AngleScatter> scatter;
+  results::ZeroMovement movement;
+  for (const StepMean& step : steps) movement.add(step);
   for (auto& [phi_deg, measured] : by_angle(steps)) {
     try {
       table.push_back(coefficient(phi_deg, measured, options, at_speed_rad_s));
     } catch (const FitError& error) {
       throw FitError(fmt::format("phi = {} deg: {}", phi_deg, error.what()));
     }
-    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s));
+    scatter.push_back(scatter_of(table.back(), options.estimator, at_speed_rad_s, movement));
   }
-  repeatability = fit::repeatability(std::move(scatter));
+  repeatability = fit::repeatability(std::move(scatter), {movement.usual_n(), 0, movement.runs()});
+  if (options.mounting && !repeatability.repeated) {
+    repeatability.between.u = *options.mounting;
+    repeatability.between_known = true;
+  }
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
-    if (repeatability.repeated) row.standard_error = repeatability.independent_u(i);
+    if (repeatability.between_known) row.standard_error = repeatability.independent_u(i);
     row.air = air_of(row.measured);
   }
   return table;

@@ -34,6 +34,7 @@ struct IdentificationOptions {
   Loss loss = Loss::none;
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
   std::vector<LeftOutRun> left_out{};
+  std::optional<double> mounting{};  ///< relative, of k from mounting to mounting, for a campaign without repetitions
   std::optional<double> at_speed_rad_s{};  ///< for "k at speed"; default: the highest level measured at every φ
   CurveOptions curve{};
   std::string propeller{};  ///< empty: as the steps say
@@ -64,8 +65,8 @@ struct Identification {
   int blades = 0;                           ///< 0: unknown
   IdentificationOptions options;            ///< by which it was fitted
   std::vector<OcclusionCoefficient> table;  ///< ascending φ, the first is φ = 0
-  CurveFit curve_fit;
-  Repeatability repeatability;  ///< one angle per row of the table; empty in a table without steps
+  CurveFit curve_fit;                       ///< without points if no occlusion was measured
+  Repeatability repeatability;              ///< one angle per row of the table; empty in a table without steps
   StepSelection selection;
   std::optional<Estimate> air;  ///< kg/m³, of the steps used; nullopt: unknown, and so is every k at standard density
   double at_speed_rad_s = 0;    ///< commanded level of "k at speed"; 0: none
@@ -73,6 +74,8 @@ struct Identification {
   double speed_min_rad_s = 0;   ///< speeds measured at every φ: the valid range of the curve
   double speed_max_rad_s = 0;
 
+  /// No occlusion was measured: K_T alone, as an imported log has it. Then there is no curve.
+  [[nodiscard]] bool alone() const { return curve_fit.points.empty(); }
   /// Thrust coefficient measured at φ = 0, N/(rad/s)².
   [[nodiscard]] Estimate thrust_coefficient() const { return {curve_fit.K_T, curve_fit.K_T_standard_error}; }
   /// From this φ on the curve that flies lies between points that carry it.

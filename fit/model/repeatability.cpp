@@ -38,12 +38,13 @@ double between_u(const Repeatability& all, const AngleScatter& angle) {
 }  // namespace
 
 std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps, const ThrustFit& fit,
-                                  double k) {
+                                  double k, const results::ZeroMovement& movement) {
   std::map<int, RunSums> runs;
-  std::map<int, results::RunZero> zeros;
+  std::map<int, double> moved;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     RunSums& run = runs[steps[i].repetition];
-    zeros[steps[i].repetition].add(steps[i]);
+    run.zero_u_n = std::fmax(run.zero_u_n, steps[i].zero_u_n);  // ignores an unknown one
+    moved.try_emplace(steps[i].repetition, movement.of_run_n(steps[i]));
     const double w = weight_of(fit, i), x = shape(fit, k, i);
     run.xt += w * x * fit.points[i].thrust_n;
     run.xx += w * x * x;
@@ -53,7 +54,7 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
   for (auto& [repetition, run] : runs) {
     run.phi_deg = phi_deg;
     run.repetition = repetition;
-    run.zero_u_n = zeros[repetition].u_n();
+    run.zero_u_n = results::shared_zero_u(run.zero_u_n, moved.at(repetition));
     if (run.xx > 0) result.push_back(run);
   }
   return result;
@@ -119,15 +120,17 @@ AngleScatter scatter_of_angle(double k, std::vector<RunSums> runs, const WithinR
   return angle;
 }
 
-Repeatability repeatability(std::vector<AngleScatter> angles) {
+Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& zero_movement) {
   Repeatability result;
+  result.zero_movement = zero_movement;
   std::vector<std::vector<results::RunShare>> shares;
   for (const AngleScatter& angle : angles)
     if (angle.k != 0) shares.push_back(shares_of(angle));
-  const double freedom = results::freedom_between(shares);
   result.angles = std::move(angles);
-  result.repeated = freedom > 0;
-  if (result.repeated) result.between = {0, std::sqrt(results::variance_between(shares)), freedom};
+  result.repeated = result.between_known = results::freedom_between(shares) > 0;
+  if (!result.repeated) return result;
+  const double variance = results::variance_between(shares);
+  result.between = {0, std::sqrt(variance), results::freedom_of(variance, shares)};
   return result;
 }
 

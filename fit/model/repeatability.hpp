@@ -7,6 +7,7 @@
 
 #include "fit/model/thrust_fit.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
+#include "results/reduction/repetitions.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
@@ -29,9 +30,9 @@ struct WithinRuns {
 };
 
 /// One per repetition, ascending. `fit` was made of `steps`, one point each in the same order; x is its map divided by
-/// `k`.
+/// `k`; `movement` of the zeros of the campaign.
 [[nodiscard]] std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps,
-                                                const ThrustFit& fit, double k);
+                                                const ThrustFit& fit, double k, const results::ZeroMovement& movement);
 
 /// From the interaction of step and repetition, which contains neither errors of whole runs nor of the map; from the
 /// residuals of a single run. Each step counts by its own scatter (MacKinnon, White 1985), since thrust scatters more
@@ -54,7 +55,9 @@ struct AngleScatter {
 struct Repeatability {
   std::vector<AngleScatter> angles;
   Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  bool repeated = false;  ///< at least one φ was measured more than once; otherwise `between` is unknown
+  bool repeated = false;  ///< at least one φ was measured more than once
+  bool between_known = false;  ///< from repetitions, or given
+  Estimate zero_movement{};    ///< of a run's zero, usually, N; freedom: the runs behind it
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;
@@ -62,7 +65,7 @@ struct Repeatability {
   [[nodiscard]] double freedom() const;
 };
 
-[[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles);
+[[nodiscard]] Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& zero_movement = {});
 
 /// A run further from the others of its φ than chance explains. It stays in k and in the scatter of the repetitions.
 struct OutlyingRun {

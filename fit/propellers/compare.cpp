@@ -14,6 +14,8 @@
 #include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
+#include "results/checksums.hpp"
+#include "results/file_layer.hpp"
 #include "results/reduction/bin_statistics.hpp"
 #include "results/steps_csv.hpp"
 
@@ -187,7 +189,11 @@ ComparedResult load_result(const std::string& path) {
   const fs::path coefficients = fs::is_directory(place) ? place / "coefficients.yaml" : place;
   const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
   if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
-  if (fs::exists(coefficients)) return result_of(compensation::load_coefficients(coefficients.string()), path);
+  if (fs::exists(coefficients)) {
+    const compensation::Coefficients file = compensation::load_coefficients(coefficients.string());
+    results::require_seal(results::read_text(coefficients), coefficients.string());
+    return result_of(file, path);
+  }
   if (!fs::exists(steps))
     throw ConfigurationError(
         path + ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name another folder");

@@ -173,11 +173,12 @@ std::string coefficient_section(const Fitted& fitted) {
                    "R²", "steps"});
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const OcclusionCoefficient& row = identification.table[i];
-    const double miss = identification.curve().at(from_degrees(row.phi_deg)).value() - row.k;
+    const double miss =
+        identification.alone() ? 0 : identification.curve().at(from_degrees(row.phi_deg)).value() - row.k;
     table.row({html_angle(row.phi_deg), both_units(row.k, analysis.coefficients[i].expanded()),
                row.at_speed ? both_units(row.at_speed->k, kNoError) : "–",
                fmt::format("{:.1f} %", 100 * share_of_thrust(identification, row)),
-               signed_percent(100 * miss / identification.thrust_coefficient().value),
+               identification.alone() ? "–" : signed_percent(100 * miss / identification.thrust_coefficient().value),
                row.fit ? fmt::format("{:.2f}", 1e3 * row.fit->rms_n) : "–",
                row.fit ? fmt::format("{:.5f}", row.fit->r_squared) : "–",
                row.fit ? fmt::format("{}", row.fit->n) : "–"});

@@ -125,7 +125,8 @@ std::string provenance_section(const Identification& identification, const Prove
   html += entry("Campaign", known(provenance.campaign));
   html += entry("Fitted from", provenance.source);
   html += entry("Model", "T = k ω²: " + estimator_words(identification));
-  html += entry("k(φ)", curve.model().words(curve) + ", points " + points);
+  html += entry("k(φ)", identification.alone() ? "none: no occlusion was measured"
+                                               : curve.model().words(curve) + ", points " + points);
   if (speeds_known(identification))
     html += entry("Speeds", html_rpm(identification.speed_min_rad_s) + " to " +
                                 html_rpm(identification.speed_max_rad_s) + " RPM");

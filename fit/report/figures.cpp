@@ -388,7 +388,8 @@ Figure family_figure(std::span<const Fitted> family) {
 Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares, const std::filesystem::path& folder,
                      const std::string& gnuplot, const Settling* settling) {
   const Identification& identification = fitted.identification;
-  std::vector<Figure> wanted{share_figure(fitted, shares)};
+  std::vector<Figure> wanted;
+  if (!identification.alone()) wanted.push_back(share_figure(fitted, shares));
   if (std::ranges::all_of(identification.table, [](const auto& row) { return row.fit.has_value(); })) {
     wanted.push_back(thrust_figure(identification));
     wanted.push_back(speed_figure(identification));

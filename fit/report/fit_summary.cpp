@@ -129,7 +129,8 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
               const std::filesystem::path& coefficients) {
   const Budget& K_T = analysis.coefficients.front();
   const CurveFit& fit = identification.curve_fit;
-  Json curve{{"form", name_of(fit.form)}, {"anchored", fit.anchored}}, table = Json::array();
+  Json curve, table = Json::array();
+  if (!identification.alone()) curve = {{"form", name_of(fit.form)}, {"anchored", fit.anchored}};
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const Budget& budget = analysis.coefficients[i];
     table.push_back({{"phi_deg", identification.table[i].phi_deg},
@@ -143,7 +144,7 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
                                     {"expanded_95", analysis.parameters[i].expanded()}};
   Json doubts = Json::array();
   for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(doubt.text);
-  return {{"coefficients", coefficients.string()},
+  return {{"coefficients", coefficients.empty() ? Json() : Json(coefficients.string())},
           {"verdict", name_of(analysis.flight.readiness())},
           {"doubts", doubts},
           {"k_unit", "N/(rad/s)^2"},

@@ -108,6 +108,7 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
     const std::filesystem::path path = folder / run.file;
     std::error_code unknown;
     if (!std::filesystem::exists(path, unknown)) continue;
+    results::require_unchanged_run(path, {{path.filename().string(), run.sha256}});
     const results::RunRecording recording = results::read_run(path, cell);
     run.account = recording.account;
     run.outcome = recording.outcome == results::Outcome::complete ? "complete" : "aborted: " + recording.outcome_reason;

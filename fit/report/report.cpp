@@ -20,10 +20,12 @@ constexpr const char* kPageEnd = "</body>\n</html>\n";
 
 /// At the top of the page.
 std::string verdict_box(const FlightReadiness& flight) {
-  std::string html = fmt::format("<div class=\"verdict {}\"><h3>{}</h3>\n", name_of(flight.readiness()),
-                                 flight.doubts.empty()                      ? "Fit to fly: no test of the model falls"
-                                 : flight.readiness() == Readiness::not_yet ? "Do not fly yet"
-                                                                            : "Fly with care");
+  std::string html =
+      fmt::format("<div class=\"verdict {}\"><h3>{}</h3>\n", name_of(flight.readiness()),
+                  !flight.has_curve ? "K<sub>T</sub> alone: no occlusion was measured, so there is no k(φ) to fly with"
+                  : flight.doubts.empty()                    ? "Fit to fly: no test of the model falls"
+                  : flight.readiness() == Readiness::not_yet ? "Do not fly yet"
+                                                             : "Fly with care");
   for (const Doubt& doubt : flight.doubts) html += "<p>" + typeset(doubt.text) + "</p>\n";
   return html + "</div>\n";
 }
@@ -57,6 +59,7 @@ std::string headline(const Fitted& fitted) {
 
 /// The result in one sentence.
 std::string lead(const Identification& identification) {
+  if (identification.alone()) return {};
   const OcclusionCoefficient& widest = identification.table.back();
   const bool at = identification.at_speed_rad_s > 0 && widest.at_speed;
   const CurveParameter* slope = identification.curve_fit.find("slope_per_deg");

@@ -174,6 +174,7 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
         "repetition {} at {}° stands out, {:+.2f} % from the others ({}): it is kept, and its scatter is in the "
         "budget of every k; look for a cause and repeat this occlusion",
         run.repetition, run.phi_deg, 100 * run.share, std::isnan(run.p) ? "Hampel" : fmt::format("p = {:.2g}", run.p)));
+  if (identification.alone()) return remarks;
   for (std::string& remark :
        identification.curve_fit.remarks(analysis.shape.mismatch, identification.table.back().phi_deg))
     remarks.push_back(std::move(remark));
@@ -234,20 +235,11 @@ std::vector<Budget> standard_air(const Identification& identification, const std
   return result;
 }
 
-}  // namespace
-
-Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
-  Analysis analysis;
-  std::vector<double> phis;
-  for (const OcclusionCoefficient& row : identification.table) phis.push_back(row.phi_deg);
-  const bool from_steps = !identification.repeatability.angles.empty();
-  if (from_steps) analysis.speed = speed_dependence(identification.table);
-  const ErrorSources sources = sources_of(identification, analysis, options.bench);
-  for (std::size_t i = 0; i < phis.size(); ++i)
-    analysis.coefficients.push_back(
-        sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
-
-  const double freedom = from_steps ? identification.repeatability.freedom() : std::numeric_limits<double>::infinity();
+/// What is known of the curve. Call it with the coefficients.
+void take_curve(const Identification& identification, const ErrorSources& sources, const AnalysisOptions& options,
+                Analysis& analysis) {
+  const double freedom = !identification.repeatability.angles.empty() ? identification.repeatability.freedom()
+                                                                      : std::numeric_limits<double>::infinity();
   const CurveFit& fit = identification.curve_fit;
   analysis.curvature = fit.tested(freedom);
   analysis.line = straight_line(identification, sources, freedom);
@@ -258,12 +250,28 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   for (const double phi : options.prediction_deg)
     analysis.predictions.push_back(predict(identification, sources, phi, misfit));
   analysis.band = band_of(identification, sources, misfit);
-  analysis.standard = standard_air(identification, analysis.coefficients, options.bench.air_density);
-  analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
-  analysis.between_runs = identification.repeatability.between;
   analysis.shape = shape_of(fit, sources, misfit);
   if (const double u = analysis.coefficients.front().combined(); std::isnan(u))
     analysis.covariance[0][0] = analysis.shape.mismatch.u = u;
+}
+
+}  // namespace
+
+Analysis analyse(const Identification& identification, const AnalysisOptions& options) {
+  Analysis analysis;
+  std::vector<double> phis;
+  for (const OcclusionCoefficient& row : identification.table) phis.push_back(row.phi_deg);
+  const bool from_steps = !identification.repeatability.angles.empty();
+  if (from_steps) analysis.speed = speed_dependence(identification.table, identification.repeatability.zero_movement);
+  const ErrorSources sources = sources_of(identification, analysis, options.bench);
+  for (std::size_t i = 0; i < phis.size(); ++i)
+    analysis.coefficients.push_back(
+        sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
+
+  if (!identification.alone()) take_curve(identification, sources, options, analysis);
+  analysis.standard = standard_air(identification, analysis.coefficients, options.bench.air_density);
+  analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
+  analysis.between_runs = identification.repeatability.between;
   analysis.outlying = outlying_runs(identification.selection.used);
   analysis.flight =
       flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences});

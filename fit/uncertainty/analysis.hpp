@@ -17,7 +17,7 @@ namespace kphi::fit {
 
 struct AnalysisOptions {
   BenchUncertainty bench;
-  std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 150, 180, 210, 240, 270};
+  std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 135, 150, 180, 210, 240, 270};
 };
 
 /// A point that the robust loss nearly ignored.

@@ -19,12 +19,13 @@ struct Entry {
   double unit;
 };
 
-constexpr std::array<Entry, 5> kEntries{{
+constexpr std::array<Entry, 6> kEntries{{
     {"calibration", &BenchUncertainty::cell_calibration, 1},
     {"cross-axis", &BenchUncertainty::cross_axis, 1},
     {"alignment-deg", &BenchUncertainty::alignment_rad, kPi / 180},
     {"clock", &BenchUncertainty::motor_clock, 1},
     {"density", &BenchUncertainty::air_density, 1},
+    {"mounting", &BenchUncertainty::mounting, 1},
 }};
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -75,14 +76,18 @@ void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
 
 void add_repeatability(ErrorSources& sources, const Repeatability& all) {
   ErrorSource noise{"noise within runs", Evaluation::type_a, kUnitOfK};
-  ErrorSource between{"repetitions", Evaluation::type_a, "1"};
-  ErrorSource zero{"zero", Evaluation::type_b, "N", "of each run: as measured, and half of its drift"};
+  ErrorSource between{"repetitions", all.repeated ? Evaluation::type_a : Evaluation::type_b, "1"};
+  ErrorSource zero{"zero", Evaluation::type_b, "N",
+                   "of each run: as measured, and how far zeros usually move in a run"};
+  zero.shared_freedom = all.zero_movement.value > 0 ? all.zero_movement.freedom : 0;
   between.shared_freedom = all.between.freedom;
-  between.note = all.repeated ? "beyond noise and zero, pooled over phi" : "unknown: one run each";
+  between.note = all.repeated        ? "beyond noise and zero, pooled over phi"
+                 : all.between_known ? "one run each; as given for the mounting"
+                                     : "unknown: one run each; repeat, or give it with --u mounting=VALUE";
   for (const AngleScatter& angle : all.angles) {
     const double runs = static_cast<double>(angle.runs.size());
     noise.effects.push_back({angle.within_u(), 1, angle.within.freedom > 0 ? angle.within.freedom : kEndless});
-    between.effects.push_back({all.repeated ? all.between.u / std::sqrt(runs) : kUnknown, angle.k});
+    between.effects.push_back({all.between_known ? all.between.u / std::sqrt(runs) : kUnknown, angle.k});
     zero.effects.push_back({angle.zero_u_n, angle.zero_sensitivity});
   }
   sources.sources.insert(sources.sources.end(), {noise, between, zero});
@@ -136,10 +141,11 @@ void set_uncertainty(BenchUncertainty& bench, const std::string& text) {
     bench.*entry.member = value * entry.unit;
     return;
   }
-  throw ConfigurationError(fmt::format(
-      "--u {}: expected NAME=VALUE, NAME one of calibration, cross-axis, clock, density (relative: 0.002 is 0.2 %) or "
-      "alignment-deg, VALUE a standard uncertainty, 0 or above",
-      text));
+  throw ConfigurationError(
+      fmt::format("--u {}: expected NAME=VALUE, NAME one of calibration, cross-axis, clock, density, mounting "
+                  "(relative: 0.002 is 0.2 %) "
+                  "or alignment-deg, VALUE a standard uncertainty, 0 or above",
+                  text));
 }
 
 std::vector<std::pair<std::string, double>> known_uncertainties(const BenchUncertainty& bench) {

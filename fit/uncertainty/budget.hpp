@@ -61,9 +61,11 @@ struct BenchUncertainty {
   std::optional<double> alignment_rad;     ///< between thrust and the cell's axis
   std::optional<double> motor_clock;       ///< relative, of the clock behind the speed of the motor module
   std::optional<double> air_density;       ///< relative; enters k in standard air only
+  /// Relative, of k from mounting to mounting; repetitions tell it better. Given to IdentificationOptions, too.
+  std::optional<double> mounting;
 };
 
-/// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density. Throws ConfigurationError.
+/// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density, mounting. Throws ConfigurationError.
 void set_uncertainty(BenchUncertainty& bench, const std::string& text);
 
 /// NAME and VALUE of those that are known, as set_uncertainty reads them.

@@ -16,6 +16,9 @@ namespace {
 /// A line that misses a measured k by more than this share of K_T does not give the thrust that was asked for.
 constexpr double kLargestMiss = 0.05;
 
+/// Less than this share of the thrust no flight notices, however surely a test sees it.
+constexpr double kNegligible = 0.001;
+
 /// A run that stands out by less moves the mean of three by less than 0.5 %, and the scatter in the ± has it.
 constexpr double kSmallStray = 0.015;
 
@@ -45,7 +48,7 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
     const double p = of_both(one.lack_of_fit.p, one.trend.p);
     if (std::isnan(p) || one.levels.size() < 2) continue;
     ++count;
-    if (!(p < clearest.p)) continue;
+    if (!(p < clearest.p) || std::abs(one.change.value) < kNegligible) continue;
     clearest.p = p;
     const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
     clearest.doubt.text = fmt::format(
@@ -60,6 +63,7 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
 }
 
 std::optional<Suspicion> of_curve(const Identification& identification, const ModelTests& tests) {
+  if (identification.alone()) return std::nullopt;
   const CurveFit& fit = identification.curve_fit;
   const HypothesisTest &form = tests.curvature.lack_of_fit, &quadratic = tests.curvature.quadratic;
   const double p = quadratic.name.empty() ? form.p : of_both(form.p, quadratic.p);
@@ -68,6 +72,7 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
   for (std::size_t i = 0; i < fit.residuals.size(); ++i)
     if (std::abs(fit.residuals[i]) > std::abs(fit.residuals[worst])) worst = i;
   const double miss = fit.residuals[worst] / fit.K_T;
+  if (std::abs(miss) < kNegligible) return Suspicion{};
   return Suspicion{
       p,
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
@@ -108,7 +113,7 @@ std::vector<Doubt> of_order(const Identification& identification, const ModelTes
 }  // namespace
 
 FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests) {
-  FlightReadiness flight{of_order(identification, tests)};
+  FlightReadiness flight{of_order(identification, tests), !identification.alone()};
   std::vector<Suspicion> all;
   for (const auto& one : {of_speed(identification, tests), of_curve(identification, tests), of_runs(tests)})
     if (one) all.push_back(*one);
@@ -118,10 +123,10 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
   for (Suspicion& one : all)
     if (one.p < level) flight.doubts.push_back(std::move(one.doubt));
   const bool from_steps = !identification.repeatability.angles.empty();
-  if (from_steps && !identification.repeatability.repeated)
+  if (from_steps && !identification.repeatability.between_known)
     flight.doubts.push_back({Readiness::with_care,
                              "every occlusion was measured once: how much k changes from mounting to mounting is "
-                             "unknown, and not in the ±; repeat the campaign"});
+                             "unknown, and not in the ±; repeat the campaign, or give it (--u mounting=VALUE)"});
   if (!from_steps &&
       std::ranges::any_of(identification.table, [](const auto& row) { return !(row.standard_error > 0); }))
     flight.doubts.push_back(
@@ -131,12 +136,12 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
 }
 
 const char* words(Readiness readiness) {
-  constexpr std::array kWords{"fit to fly", "fly with care", "do not fly yet"};
+  constexpr std::array kWords{"fit to fly", "fly with care", "do not fly yet", "K_T alone, no k(φ) to fly with"};
   return kWords[static_cast<std::size_t>(readiness)];
 }
 
 const char* name_of(Readiness readiness) {
-  constexpr std::array kNames{"fit_to_fly", "with_care", "not_yet"};
+  constexpr std::array kNames{"fit_to_fly", "with_care", "not_yet", "no_curve"};
   return kNames[static_cast<std::size_t>(readiness)];
 }
 

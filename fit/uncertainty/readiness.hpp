@@ -15,6 +15,7 @@ enum class Readiness : std::uint8_t {
   fit_to_fly,
   with_care,  ///< read the doubts first
   not_yet,    ///< the thrust would be wrong: mend or repeat first
+  no_curve,   ///< no occlusion was measured: nothing to fly with
 };
 
 /// One thing that speaks against the result: what, how large, what follows from it, what to do.
@@ -27,9 +28,10 @@ struct FlightReadiness {
   /// Worst first. Of the tests of the model (k against speed, the curve's form, a run that stands out) those that fall
   /// under Holm at 5 % for all together; k that rises with φ; and one repetition, which shows no scatter.
   std::vector<Doubt> doubts;
+  bool has_curve = true;
 
   [[nodiscard]] Readiness readiness() const {
-    return doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
+    return !has_curve ? Readiness::no_curve : doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
   }
 };
 
@@ -43,10 +45,10 @@ struct ModelTests {
 
 [[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests);
 
-/// "fit to fly", "fly with care", "do not fly yet".
+/// "fit to fly", "fly with care", "do not fly yet", "K_T alone, no k(φ) to fly with".
 [[nodiscard]] const char* words(Readiness readiness);
 
-/// "fit_to_fly", "with_care", "not_yet".
+/// "fit_to_fly", "with_care", "not_yet", "no_curve".
 [[nodiscard]] const char* name_of(Readiness readiness);
 
 }  // namespace kphi::fit

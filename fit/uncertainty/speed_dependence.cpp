@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <numeric>
 
 #include "base/error.hpp"
 #include "base/statistics.hpp"
@@ -27,11 +29,12 @@ struct Run {
   double zero_u_n = kNan;       ///< of the zero that they share; NaN: not known
 };
 
-std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
+std::vector<Run> runs_of(std::span<const results::StepMean> steps, double zero_movement_n) {
   std::map<int, Run> runs;
-  std::map<int, results::RunZero> zeros;
+  std::map<int, double> zeros;
   for (const results::StepMean& step : steps) {
-    zeros[step.repetition].add(step);
+    double& zero_u = zeros[step.repetition];
+    zero_u = std::fmax(zero_u, step.zero_u_n);  // ignores an unknown one
     if (!(step.speed_rad_s > 0)) continue;
     runs[step.repetition].samples.push_back(
         {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
@@ -41,40 +44,37 @@ std::vector<Run> runs_of(std::span<const results::StepMean> steps) {
     double xt = 0, xx = 0;
     for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
     run.k = xt / xx;
-    if (const double u = zeros[repetition].u_n(); u > 0) run.zero_u_n = u;
+    if (const double u = results::shared_zero_u(zeros[repetition], zero_movement_n); u > 0) run.zero_u_n = u;
     std::ranges::sort(run.samples, {}, &Sample::level);
     result.push_back(std::move(run));
   }
   return result;
 }
 
-/// Variance of one step as a + b x², neither negative: the cell's noise and the air's.
+/// Variance of one step as a + b x², neither negative: the cell's noise and the air's. x may be the thrust as well.
 struct NoiseModel {
   double constant = 1, growing = 0;
   [[nodiscard]] double at(double x) const { return constant + growing * x * x; }
 };
 
-/// From the variances of the levels at x.
+/// From the variances of the levels at x, each of which scatters in proportion to itself: fitted with weights of the
+/// last round, so that the quiet levels tell the constant.
 NoiseModel noise_of(const std::vector<double>& x, const std::vector<double>& variances) {
-  const double scale = *std::ranges::max_element(x);
+  constexpr int kRounds = 5;
+  const double scale = *std::ranges::max_element(x), average = mean(variances);
   std::vector<double> squares;
-  double mean = 0, share = 0, square_sum = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    squares.push_back(std::pow(x[i] / scale, 2));
-    mean += variances[i] / static_cast<double>(x.size());
-    share += variances[i] * squares[i];
-    square_sum += squares[i] * squares[i];
-  }
-  NoiseModel model{mean, 0};
-  try {
-    const Regression line = regress_polynomial(squares, variances, 0, 1);
-    if (line.estimates[0] > 0 && line.estimates[1] >= 0) {
-      model = {line.estimates[0], line.estimates[1] / (scale * scale)};
-    } else if (line.estimates[0] <= 0 && share > 0) {
-      // All of it grows; a hundredth of the mean keeps the lowest levels from weighing without limit.
-      model = {0.01 * mean, share / square_sum / (scale * scale)};
+  for (const double one : x) squares.push_back(std::pow(one / scale, 2));
+  NoiseModel model{average, 0};
+  for (int round = 0; round < kRounds && average > 0; ++round) {
+    std::vector<double> weights;
+    for (const double one : x) weights.push_back(1 / std::pow(model.at(one), 2));
+    try {
+      const Regression line = regress_polynomial(squares, variances, 0, 1, weights);
+      // A hundredth of the mean keeps the lowest levels from weighing without limit.
+      model = {std::max(line.estimates[0], 0.01 * average), std::max(line.estimates[1], 0.0) / (scale * scale)};
+    } catch (const FitError&) {
+      break;
     }
-  } catch (const FitError&) {
   }
   return model;
 }
@@ -85,6 +85,9 @@ struct RunModel {
   NoiseModel noise;
   bool zero_is_free = false;
 
+  [[nodiscard]] std::vector<double> row_of(const Sample& sample) const {
+    return {sample.x, 1, k * sample.x * (sample.speed - middle) / spread};
+  }
   /// The trend is the last term. The last residual is that of the zero if its uncertainty is known.
   [[nodiscard]] Regression fit(const std::vector<Sample>& samples, double zero_u_n) const {
     std::vector<std::vector<double>> rows;
@@ -95,13 +98,33 @@ struct RunModel {
       thrusts.push_back(thrust);
       weights.push_back(1 / variance);
     };
-    for (const Sample& sample : samples)
-      add({sample.x, 1, k * sample.x * (sample.speed - middle) / spread}, sample.thrust, noise.at(sample.x));
+    for (const Sample& sample : samples) add(row_of(sample), sample.thrust, noise.at(sample.x));
     if (!zero_is_free) add({0, 1, 0}, 0, zero_u_n * zero_u_n);
     if (rows.size() <= (spread > 0 ? 3 : 2)) throw FitError("k against speed: too few steps in a run");
     return regress(rows, thrusts, weights);
   }
 };
+
+/// Variance that a zero wandering within the run adds to its trend; a movement of 1 N is usual. About its mean, which
+/// counts as the zero's own error, a random walk tied at both ends has the covariance 1/12 − d/2 + d²/2, d the time
+/// between two steps as a share of the run (Watson, Biometrika 48 (1961) 109).
+double variance_by_wandering(const RunModel& model, const std::vector<Sample>& samples, const Regression& found) {
+  std::vector<double> influence;  // of the thrust of each step on the trend
+  for (const Sample& sample : samples) {
+    const std::vector<double> row = model.row_of(sample);
+    const auto& covariance = found.covariance.back();
+    influence.push_back(std::inner_product(row.begin(), row.end(), covariance.begin(), 0.0) / model.noise.at(sample.x));
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    for (std::size_t j = 0; j < samples.size(); ++j) {
+      const double apart =
+          std::abs(static_cast<double>(i) - static_cast<double>(j)) / static_cast<double>(samples.size());
+      sum += influence[i] * influence[j] * (1.0 / 12 - apart / 2 + apart * apart / 2);
+    }
+  }
+  return std::max(0.0, sum);
+}
 
 /// The levels that all runs measured, one column each.
 std::vector<Run> complete_levels(std::vector<Run> runs) {
@@ -122,13 +145,18 @@ std::vector<double> column(const std::vector<std::vector<double>>& runs, std::si
 
 /// The runs at one φ, prepared for the tests.
 struct Angle {
-  std::vector<Run> runs;  ///< as measured
+  double k = 0;               ///< mean over the runs
+  std::vector<Run> runs;      ///< as measured
+  std::vector<Run> complete;  ///< the levels that all of them measured
   RunModel model;
   std::vector<std::vector<double>>
       standardised;            ///< residuals of each run in its noise, complete levels, then the zero
   std::vector<double> trends;  ///< of each run, shares of k
   double trend_u = 0;          ///< of one run, as the noise has it
-  double alone_freedom = 0;    ///< of a single run
+  double wandering_share = 0;  ///< of trend_u²
+  double alone_freedom = 0;    ///< of the noise in a single run
+
+  [[nodiscard]] bool comparable() const { return complete.size() > 1 && complete.front().samples.size() > 3; }
 };
 
 double mean_x(const std::vector<Run>& runs, std::size_t i) {
@@ -137,37 +165,40 @@ double mean_x(const std::vector<Run>& runs, std::size_t i) {
   return sum;
 }
 
-/// Noise from how the runs differ at each level, each about its own k and zero.
-void take_noise(const std::vector<Run>& complete, RunModel& model) {
-  std::vector<std::vector<double>> residuals;
-  RunModel free;
-  free.zero_is_free = true;
-  for (const Run& run : complete) residuals.push_back(free.fit(run.samples, kNan).residuals);
-  std::vector<double> x, variances;
-  for (std::size_t i = 0; i < complete.front().samples.size(); ++i) {
-    x.push_back(mean_x(complete, i));
-    variances.push_back(variance(column(residuals, i)));
+/// By the thrust, from how the runs of each φ differ at each level, each about its own k and zero; of all φ together,
+/// since one alone would fit its own differences too well to be their measure.
+NoiseModel noise_of(const std::vector<Angle>& angles) {
+  std::vector<double> thrusts, variances;
+  for (const Angle& angle : angles) {
+    if (!angle.comparable()) continue;
+    std::vector<std::vector<double>> residuals;
+    RunModel free;
+    free.zero_is_free = true;
+    for (const Run& run : angle.complete) residuals.push_back(free.fit(run.samples, kNan).residuals);
+    for (std::size_t i = 0; i < angle.complete.front().samples.size(); ++i) {
+      thrusts.push_back(angle.k * mean_x(angle.complete, i));
+      variances.push_back(variance(column(residuals, i)));
+    }
   }
-  model.noise = noise_of(x, variances);
+  return thrusts.empty() ? NoiseModel{} : noise_of(thrusts, variances);
 }
 
-void take_residuals(const std::vector<Run>& complete, Angle& angle) {
-  for (const Run& run : complete) {
+void take_residuals(Angle& angle) {
+  for (const Run& run : angle.complete) {
     auto residuals = angle.model.fit(run.samples, run.zero_u_n).residuals;
     for (std::size_t i = 0; i < run.samples.size(); ++i)
-      residuals[i] /= std::sqrt(angle.model.noise.at(mean_x(complete, i)));
+      residuals[i] /= std::sqrt(angle.model.noise.at(mean_x(angle.complete, i)));
     if (!angle.model.zero_is_free) residuals.back() /= run.zero_u_n;
     angle.standardised.push_back(std::move(residuals));
   }
 }
 
-void take_trends(Angle& angle, double slowest, double fastest) {
+void take_trends(Angle& angle, double slowest, double fastest, const Estimate& zero_movement) {
   RunModel model = angle.model;
   model.middle = 0.5 * (slowest + fastest);
   model.spread = fastest - slowest;
-  model.k = 0;
-  for (const Run& run : angle.runs) model.k += run.k / static_cast<double>(angle.runs.size());
-  double squares = 0;
+  model.k = angle.k;
+  double noise = 0, wandering = 0;
   for (const Run& run : angle.runs) {
     if (angle.runs.size() == 1) {  // its own residuals tell the noise
       RunModel free = model;
@@ -177,41 +208,56 @@ void take_trends(Angle& angle, double slowest, double fastest) {
     if (!(model.noise.at(run.samples.front().x) > 0)) return;
     const Regression found = model.fit(run.samples, run.zero_u_n);
     angle.trends.push_back(found.estimates.back());
-    squares += found.covariance.back().back();
+    noise += found.covariance.back().back();
     angle.alone_freedom = static_cast<double>(found.freedom);
+    if (!model.zero_is_free && zero_movement.value > 0)
+      wandering += variance_by_wandering(model, run.samples, found) * std::pow(zero_movement.value, 2);
   }
-  angle.trend_u = std::sqrt(squares / static_cast<double>(angle.runs.size()));
+  angle.trend_u = std::sqrt((noise + wandering) / static_cast<double>(angle.runs.size()));
+  angle.wandering_share = wandering / (noise + wandering);
 }
 
-/// From the correlation of the residuals of neighbouring steps, after Box.
-double independent_share(const std::vector<Angle>& angles) {
-  std::vector<double> products;
-  double n = 0, length = 0;
-  for (const Angle& angle : angles) {
-    if (angle.standardised.size() < 2) continue;
-    const std::size_t levels = angle.standardised.front().size() - (angle.model.zero_is_free ? 0 : 1);
-    products.resize(std::max(products.size(), levels / 2 + 1));
-    std::vector<double> means;
-    for (std::size_t i = 0; i < levels; ++i) means.push_back(mean(column(angle.standardised, i)));
-    for (const auto& run : angle.standardised) {
-      for (std::size_t lag = 0; lag <= levels / 2; ++lag)
-        for (std::size_t i = 0; i + lag < levels; ++i)
-          products[lag] += (run[i] - means[i]) * (run[i + lag] - means[i + lag]);
+/// Differences between the runs of one φ, orthonormal (Helmert): each has the covariance of one run, and none of what
+/// the runs share.
+std::vector<std::vector<double>> contrasts_of(const Angle& angle) {
+  std::vector<std::vector<double>> contrasts;
+  for (std::size_t j = 1; j < angle.standardised.size(); ++j) {
+    const double n = static_cast<double>(j);
+    std::vector<double> contrast(angle.standardised.front().size());
+    for (std::size_t i = 0; i < contrast.size(); ++i) {
+      for (std::size_t run = 0; run < j; ++run) contrast[i] += angle.standardised[run][i];
+      contrast[i] = (contrast[i] - n * angle.standardised[j][i]) / std::sqrt(n * (n + 1));
     }
-    n += static_cast<double>(levels * (angle.standardised.size() - 1));
-    length = std::max(length, static_cast<double>(levels));
+    contrasts.push_back(std::move(contrast));
   }
-  double sum = 0;
-  for (std::size_t lag = 1; lag < products.size(); ++lag) {
-    const double rest = 1 - static_cast<double>(lag) / length;
-    const double correlation = products[0] > 0 ? products[lag] / products[0] / rest : 0;
-    sum += rest * (correlation * correlation - 1 / (n * rest));
+  return contrasts;
+}
+
+/// Degrees of freedom of the residuals of one run, (tr C)²/tr C² of their covariance C (Box). Two independent contrasts
+/// u and v tell tr C = E u·u and tr C² = E (u·v)², whatever C is; pooled over all φ. Few pairs tell tr C² badly, and
+/// too much freedom finds what is not there: it is taken one standard error larger. 1 if there are no two.
+double freedom_of_residuals(const std::vector<Angle>& angles) {
+  std::vector<std::vector<double>> all;
+  for (const Angle& angle : angles) std::ranges::move(contrasts_of(angle), std::back_inserter(all));
+  const auto product = [](const auto& u, const auto& v) {
+    return std::inner_product(u.begin(), u.end(), v.begin(), 0.0);
+  };
+  double trace = 0;
+  std::vector<double> squares;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    trace += product(all[i], all[i]) / static_cast<double>(all.size());
+    for (std::size_t j = 0; j < i; ++j) {
+      if (all[i].size() != all[j].size()) continue;
+      squares.push_back(std::pow(product(all[i], all[j]), 2));
+    }
   }
-  return 1 / (1 + 2 * std::max(0.0, sum));
+  if (squares.size() < 2) return 1;
+  const double error = std::sqrt(variance(squares) / static_cast<double>(squares.size()));
+  return std::max(1.0, trace * trace / (mean(squares) + error));
 }
 
 /// Of levels and zero, all with the k of their run taken out.
-HypothesisTest test_levels(const Angle& angle, double share) {
+HypothesisTest test_levels(const Angle& angle, double freedom) {
   const double runs = static_cast<double>(angle.standardised.size());
   double between = 0, within = 0;
   for (std::size_t i = 0; i < angle.standardised.front().size(); ++i) {
@@ -219,9 +265,7 @@ HypothesisTest test_levels(const Angle& angle, double share) {
     between += runs * std::pow(mean(values), 2);
     within += (runs - 1) * variance(values);
   }
-  const double freedom = static_cast<double>(angle.standardised.front().size()) - (angle.model.zero_is_free ? 2 : 1);
-  const double f = between / freedom / (within / (freedom * (runs - 1)));
-  return f_test(f, share * freedom, share * freedom * (runs - 1));
+  return f_test(between / within * (runs - 1), freedom, freedom * (runs - 1));
 }
 
 /// Rms of the levels' deviation about k ω² without a zero, less what noise makes of it.
@@ -248,21 +292,24 @@ std::vector<SpeedCoefficient> level_coefficients(const std::vector<Run>& runs) {
   return rows;
 }
 
-Angle prepare(const SpeedDependence& found, std::vector<Run> runs, const std::vector<Run>& complete) {
+Angle angle_of(std::vector<Run> runs) {
   Angle angle;
   angle.model.zero_is_free = std::ranges::any_of(
       runs, [](double u) { return std::isnan(u); }, &Run::zero_u_n);
+  for (const Run& run : runs) angle.k += run.k / static_cast<double>(runs.size());
+  angle.complete = complete_levels(runs);
   angle.runs = std::move(runs);
+  return angle;
+}
+
+void prepare(const SpeedDependence& found, const NoiseModel& noise, const Estimate& zero_movement, Angle& angle) {
   try {
-    if (complete.size() > 1 && complete.front().samples.size() > 3) {
-      take_noise(complete, angle.model);
-      if (angle.model.noise.at(mean_x(complete, 0)) > 0) take_residuals(complete, angle);
-    }
-    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s);
+    angle.model.noise = {noise.constant, noise.growing * angle.k * angle.k};
+    if (angle.comparable() && angle.model.noise.at(mean_x(angle.complete, 0)) > 0) take_residuals(angle);
+    take_trends(angle, found.levels.front().speed_rad_s, found.levels.back().speed_rad_s, zero_movement);
   } catch (const FitError&) {
     angle.trends.clear();
   }
-  return angle;
 }
 
 /// Variance of the trends from run to run over the variance that the noise explains; its freedom.
@@ -277,40 +324,41 @@ Estimate scatter_of_trends(const std::vector<Angle>& angles) {
   return {freedom > 0 ? squares / freedom : 1, 0, freedom};
 }
 
-void judge(const Angle& angle, const Estimate& scatter, double share, SpeedDependence& found) {
+void judge(const Angle& angle, const Estimate& scatter, const Estimate& zero_movement, double freedom,
+           SpeedDependence& found) {
   const double runs = static_cast<double>(angle.trends.size());
   if (runs > 0) {
-    const bool alone = scatter.freedom == 0;
-    found.change = {mean(angle.trends), angle.trend_u * std::sqrt(scatter.value / runs),
-                    alone ? angle.alone_freedom : scatter.freedom};
+    const double of_scatter =
+        scatter.freedom > 0 ? 1 / scatter.freedom : std::pow(1 - angle.wandering_share, 2) / angle.alone_freedom;
+    const double of_zero = std::pow(angle.wandering_share, 2) / zero_movement.freedom;
+    found.change = {mean(angle.trends), angle.trend_u * std::sqrt(scatter.value / runs), 1 / (of_scatter + of_zero)};
     found.trend = student_test(found.change, 0);
   }
-  if (angle.standardised.size() > 1) found.lack_of_fit = test_levels(angle, share);
+  if (angle.standardised.size() > 1) found.lack_of_fit = test_levels(angle, freedom);
 }
 
 }  // namespace
 
-std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table) {
+std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table,
+                                              const Estimate& zero_movement) {
   std::vector<SpeedDependence> result;
   std::vector<Angle> angles;
-  std::vector<std::vector<Run>> complete;
   for (const OcclusionCoefficient& one : table) {
-    std::vector<Run> runs = runs_of(one.measured);
-    result.push_back({});
-    result.back().phi_deg = one.phi_deg;
-    result.back().levels = level_coefficients(runs);
-    complete.push_back(complete_levels(runs));
-    const bool testable = result.back().levels.size() > 2;
-    angles.push_back(testable ? prepare(result.back(), std::move(runs), complete.back()) : Angle{});
+    angles.push_back(angle_of(runs_of(one.measured, zero_movement.value)));
+    result.emplace_back().phi_deg = one.phi_deg;
+    result.back().levels = level_coefficients(angles.back().runs);
   }
+  const NoiseModel noise = noise_of(angles);
+  for (std::size_t i = 0; i < result.size(); ++i)
+    if (result[i].levels.size() > 2) prepare(result[i], noise, zero_movement, angles[i]);
   const Estimate scatter = scatter_of_trends(angles);
-  const double share = independent_share(angles);
+  const double freedom = freedom_of_residuals(angles);
   for (std::size_t i = 0; i < result.size(); ++i) {
     SpeedDependence& found = result[i];
-    judge(angles[i], scatter, share, found);
+    judge(angles[i], scatter, zero_movement, freedom, found);
     const bool untested = !found.lack_of_fit.tested() && found.levels.size() > 2;
-    if ((untested || found.depends()) && !complete[i].front().samples.empty())
-      found.inadequacy = inadequacy_of(complete[i]);
+    if ((untested || found.depends()) && !angles[i].complete.front().samples.empty())
+      found.inadequacy = inadequacy_of(angles[i].complete);
     found.lack_of_fit.statistic = "F";
     found.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", found.phi_deg);
     found.lack_of_fit.hypothesis = found.trend.hypothesis = "k does not depend on the speed";

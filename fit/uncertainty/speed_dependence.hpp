@@ -6,7 +6,9 @@
 // pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); without that uncertainty the zero is free and
 // absorbs a constant force. Other errors of neighbouring steps (slow noise, a wandering zero) show in the differences
 // between repetitions: the trend is judged by its scatter from run to run, pooled over all φ, and the lack of fit with
-// degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484).
+// degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484). A single repetition shows none
+// of them: its trend is as uncertain as its own residuals say, and a zero that wanders between its two measurements as
+// zeros of this campaign do (a random walk tied at both ends) makes of it.
 #pragma once
 
 #include <span>
@@ -35,6 +37,8 @@ struct SpeedDependence {
 };
 
 /// One per φ, in their order. Levels that not every repetition of a φ measured are left out of its lack-of-fit test.
-[[nodiscard]] std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table);
+/// `zero_movement`: as Repeatability has it.
+[[nodiscard]] std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficient> table,
+                                                            const Estimate& zero_movement = {});
 
 }  // namespace kphi::fit

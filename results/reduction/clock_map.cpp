@@ -110,4 +110,22 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::s
   return from + static_cast<std::size_t>(std::ranges::partition_point(counts, earlier) - counts.begin());
 }
 
+std::vector<Nanoseconds> sample_times(const RunRecording& run, const LoadCellColumns& cell) {
+  std::vector<Nanoseconds> times;
+  times.reserve(cell.ft_sequence.size());
+  if (run.header.load_cell.device_rate_hz > 0) {
+    const ClockMap clock(cell, run.header.load_cell.device_rate_hz, run.events);
+    for (const ClockEpoch& epoch : clock.epochs())
+      for (std::size_t i = epoch.begin; i < epoch.end; ++i) times.push_back(clock.time_ns(epoch, i));
+  } else {
+    for (const auto& [end, arrival_ns] : cell.datagrams) times.resize(end, arrival_ns);
+  }
+  for (std::size_t i = 1; i < times.size(); ++i) times[i] = std::max(times[i], times[i - 1] + 1);
+  return times;
+}
+
+std::vector<Nanoseconds> sample_times(const RunRecording& run) {
+  return sample_times(run, {run.load_cell, run.header});
+}
+
 }  // namespace kphi::results

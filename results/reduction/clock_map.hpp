@@ -51,4 +51,9 @@ class ClockMap {
   std::vector<ClockEpoch> epochs_;
 };
 
+/// Bench time of the sample in every record, strictly increasing: by the box's clock, where 40 of them share one stamp
+/// of arrival. The stamp itself where the rate of the clock is not known.
+[[nodiscard]] std::vector<Nanoseconds> sample_times(const RunRecording& run, const LoadCellColumns& cell);
+[[nodiscard]] std::vector<Nanoseconds> sample_times(const RunRecording& run);
+
 }  // namespace kphi::results

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/error.hpp"
@@ -65,7 +66,27 @@ class Reduction {
 
   [[nodiscard]] std::vector<Transition> transitions() const { return transitions_of(held_steps()); }
 
+  [[nodiscard]] std::vector<PlotRow> plot(const Window& whole) const {
+    const CellBins bins = cell_.bins(whole);
+    const std::vector<double> thrust = thrust_in(bins);
+    const auto speeds = motor_.over(MotorChannel::speed, {0, std::numeric_limits<Nanoseconds>::max()});
+    std::vector<PlotRow> rows;
+    auto next = speeds.begin();
+    for (std::size_t i = 0; i < bins.size(); ++i) {
+      const double at = bins.window(i, i + 1).centre();
+      while (next != speeds.end() && static_cast<double>(next->time_ns) <= at) ++next;
+      const bool between = next != speeds.begin() && next != speeds.end();
+      rows.push_back(
+          {1e-9 * at, thrust[i], between ? run_.header.clock_gain * speed_between(next[-1], *next, at) : kNotMeasured});
+    }
+    return rows;
+  }
+
  private:
+  [[nodiscard]] double speed_between(const MotorReading& a, const MotorReading& b, double at) const {
+    const double share = (at - static_cast<double>(a.time_ns)) / static_cast<double>(b.time_ns - a.time_ns);
+    return run_.header.spin * std::lerp(a.value, b.value, share);
+  }
   [[nodiscard]] Nanoseconds discard() const { return nanoseconds(run_.header.minimum_discard_s); }
   [[nodiscard]] double lag_s() const { return lag_.known() ? lag_.seconds : 0; }
 
@@ -284,6 +305,17 @@ Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, {run.
 
 std::vector<Transition> transitions_of(const RunRecording& run) {
   return Reduction(run, {run.load_cell, run.header}).transitions();
+}
+
+RunViews views_of(const RunRecording& run, const LoadCellColumns& cell) {
+  RunViews views{sample_times(run, cell), {}};
+  if (views.sample_times.empty()) return views;
+  try {
+    views.plot = Reduction(run, cell).plot({views.sample_times.front(), views.sample_times.back()});
+  } catch (const RecordError&) {
+    // The scale is invalid: kphi verify says so.
+  }
+  return views;
 }
 
 std::vector<StepMean> reduce(const RunRecording& run) { return reduce(run, {run.load_cell, run.header}); }

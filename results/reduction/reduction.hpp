@@ -42,6 +42,10 @@ struct Reduced {
 /// As reduce(), with the check of the zeros.
 [[nodiscard]] Reduced reduce_with_zeros(const RunRecording& run);
 
+/// For RunWriter::finish(): the time of each sample, and thrust and speed in bins of 10 ms. No plot of a run whose
+/// scale is invalid.
+[[nodiscard]] RunViews views_of(const RunRecording& run, const LoadCellColumns& cell);
+
 /// The changes of speed of the steps that were held to their end, for estimate_lag(). Without a zero the thrust keeps
 /// its offset.
 [[nodiscard]] std::vector<Transition> transitions_of(const RunRecording& run);

@@ -109,11 +109,10 @@ std::set<int> good_levels(const Group& run) {
 }
 
 /// k and its uncertainty, over these levels.
-void fit_k(const Group& run, const std::set<int>& levels, RepetitionFigure& figure) {
-  double tx = 0, xx = 0, x_sum = 0, variance = 0;
-  RunZero zero;
+void fit_k(const Group& run, const std::set<int>& levels, const ZeroMovement& movement, RepetitionFigure& figure) {
+  double tx = 0, xx = 0, x_sum = 0, variance = 0, zero_u = 0;
   for (const StepMean* step : run) {
-    if (is_good(*step)) zero.add(*step);
+    if (is_good(*step)) zero_u = std::fmax(zero_u, step->zero_u_n);  // ignores an unknown one
     if (!levels.contains(step->step)) continue;
     const double x = square(step->speed_rad_s);
     tx += step->thrust_n * x;
@@ -122,10 +121,10 @@ void fit_k(const Group& run, const std::set<int>& levels, RepetitionFigure& figu
     variance += square(x * u_within(*step));
   }
   figure.k = tx / xx;
-  figure.u = std::sqrt(variance + square(zero.u_n() * x_sum)) / xx;
+  figure.u = std::sqrt(variance + square(shared_zero_u(zero_u, movement.of_run_n(*run.front())) * x_sum)) / xx;
 }
 
-std::vector<RepetitionFigure> figures_of(const Runs& runs) {
+std::vector<RepetitionFigure> figures_of(const Runs& runs, const ZeroMovement& movement) {
   std::vector<RepetitionFigure> figures;
   std::optional<std::set<int>> common;
   for (const auto& [repetition, run] : runs) {
@@ -136,7 +135,7 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs) {
     std::erase_if(*common, [&](int level) { return !levels.contains(level); });
   }
   for (RepetitionFigure& figure : figures) {
-    if (figure.usable && !common->empty()) fit_k(runs.at(figure.repetition), *common, figure);
+    if (figure.usable && !common->empty()) fit_k(runs.at(figure.repetition), *common, movement, figure);
   }
   return figures;
 }
@@ -331,14 +330,27 @@ std::vector<StepMean> means_of(std::span<const StepMean> steps) {
   return means;
 }
 
-void RunZero::add(const StepMean& step) {
-  own_u_ = std::fmax(own_u_, step.zero_u_n);  // ignores an unknown one
-  lowest_ = std::fmin(lowest_, step.zero_n);
-  highest_ = std::fmax(highest_, step.zero_n);
+void ZeroMovement::add(const StepMean& step) {
+  Range& range = of_run_[{step.propeller, step.occlusion_deg, step.repetition}];
+  range.moved = step.zero_moved_n;
+  range.lowest = std::fmin(range.lowest, step.zero_n);
+  range.highest = std::fmax(range.highest, step.zero_n);
 }
 
-double RunZero::u_n() const {
-  return std::hypot(own_u_, highest_ > lowest_ ? (highest_ - lowest_) / std::sqrt(12.0) : 0);
+double ZeroMovement::Range::movement() const {
+  return !std::isnan(moved) ? moved : highest > lowest ? highest - lowest : 0;
+}
+
+double ZeroMovement::usual_n() const {
+  double squares = 0;
+  for (const auto& [run, range] : of_run_) squares += square(range.movement()) / runs();
+  return std::sqrt(squares);
+}
+
+double ZeroMovement::of_run_n(const StepMean& step) const {
+  const auto own = of_run_.find({step.propeller, step.occlusion_deg, step.repetition});
+  const double usual = usual_n();
+  return own == of_run_.end() ? usual : std::hypot(usual, own->second.movement()) / std::sqrt(2.0);
 }
 
 double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
@@ -359,16 +371,31 @@ double variance_between(std::span<const std::vector<RunShare>> occlusions) {
   return high;
 }
 
+double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions) {
+  if (!(variance_between > 0)) return freedom_between(occlusions);
+  double freedom = 0;
+  for (const auto& runs : occlusions) {
+    double explained = 0;
+    for (const RunShare& run : runs) explained += run.variance / static_cast<double>(runs.size());
+    if (runs.size() > 1)
+      freedom += static_cast<double>(runs.size() - 1) * square(variance_between / (variance_between + explained));
+  }
+  return std::max(1.0, freedom);
+}
+
 std::vector<RepetitionVerdict> judge_repetitions(std::span<const StepMean> steps, const RepetitionRule& rule) {
   const auto key = [](const StepMean& step) { return std::pair(step.propeller, step.occlusion_deg); };
   std::vector<StepMean> measured;
   std::ranges::copy_if(steps, std::back_inserter(measured), [](const StepMean& step) { return step.repetition != 0; });
   const std::vector<Group> groups = groups_of(measured, key);
+  ZeroMovement movement;
+  for (const StepMean& step : measured)
+    if (is_good(step)) movement.add(step);
   std::vector<RepetitionVerdict> verdicts;
   for (const Group& group : groups) {
     Runs runs;
     for (const StepMean* step : group) runs[step->repetition].push_back(step);
-    verdicts.push_back({group.front()->propeller, group.front()->occlusion_deg, figures_of(runs)});
+    verdicts.push_back({group.front()->propeller, group.front()->occlusion_deg, figures_of(runs, movement)});
   }
   judge(verdicts, rule);
   for (std::size_t i = 0; i < verdicts.size(); ++i) {

@@ -2,10 +2,13 @@
 // reference runs at the two ends of a session.
 #pragma once
 
+#include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "results/step_mean.hpp"
@@ -29,18 +32,32 @@ namespace kphi::results {
 /// Standard uncertainty of the thrust from the noise within the step, N.
 [[nodiscard]] double thrust_u_within(const StepMean& step);
 
-/// The zero of one run, from what was subtracted at its good steps: add() them. Between the two measured zeros of a run
-/// it is a line in time; the true zero may leave that line by up to half of the movement.
-class RunZero {
+/// How far the zero usually moves during a run, from the good steps of all runs: add() them. One run tells little: a
+/// zero that wandered may be back where it began.
+class ZeroMovement {
  public:
   void add(const StepMean& step);
-  /// Standard uncertainty, N, shared by all steps; 0: unknown. That of the measured zeros, and rectangular over half of
-  /// the movement (JCGM 100, 4.3.7).
-  [[nodiscard]] double u_n() const;
+  [[nodiscard]] double usual_n() const;  ///< root mean square over the runs, N; 0: unknown
+  /// Of the run of this step, N: half by its own movement, which tells all of a jump, half by the usual one, since the
+  /// run's own tells nothing of a walk (root mean square of both).
+  [[nodiscard]] double of_run_n(const StepMean& step) const;
+  [[nodiscard]] double runs() const { return static_cast<double>(of_run_.size()); }
 
  private:
-  double own_u_ = 0, lowest_ = std::numeric_limits<double>::infinity(), highest_ = -lowest_;
+  struct Range {
+    double moved = kNotMeasured;  ///< as the run's own zeros say
+    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+    [[nodiscard]] double movement() const;
+  };
+  std::map<std::tuple<std::string, double, int>, Range> of_run_;
 };
+
+/// Standard uncertainty of the zero that all steps of a run share, N: that of the measured zeros, and of a zero that
+/// wanders between them, where it is taken as a line in time. The mean of a random walk tied at both ends deviates by
+/// 1/√12 of the movement of the free one, as much as a rectangle over half of the movement (JCGM 100, 4.3.7).
+[[nodiscard]] inline double shared_zero_u(double measured_u_n, double movement_n) {
+  return std::hypot(measured_u_n, movement_n / std::sqrt(12.0));
+}
 
 /// k of one run as a share of the k of its occlusion, with the variance that its noise and its zero explain.
 struct RunShare {
@@ -52,6 +69,9 @@ struct RunShare {
 /// Variance from run to run beyond the explained one, pooled over occlusions: the one at which χ² of the runs about the
 /// mean of their occlusion has its expectation (Mandel, Paule, Anal. Chem. 42 (1970) 1194). 0 without repetitions.
 [[nodiscard]] double variance_between(std::span<const std::vector<RunShare>> occlusions);
+/// Degrees of freedom of that variance: fewer than between the runs where noise and zero explain much of their scatter
+/// (twice its square over the variance of its estimate).
+[[nodiscard]] double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions);
 
 /// k of one repetition, N/(rad/s)²: least squares of T = k ω² over the levels that all repetitions have.
 struct RepetitionFigure {

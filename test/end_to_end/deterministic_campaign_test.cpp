@@ -2,7 +2,10 @@
 #include <gmock/gmock.h>
 #include <yaml-cpp/yaml.h>
 
+#include <random>
+
 #include "test/end_to_end/program.hpp"
+#include "test/results/recordings.hpp"
 
 namespace kphi::test::deterministic_campaign_test {
 
@@ -71,6 +74,36 @@ TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCo
   const auto K_T = [](const std::string& text) { return YAML::Load(text)["K_T"]["value"].as<double>(); };
   EXPECT_NEAR(K_T(file_named(checked, "coefficients.yaml")),
               K_T(file_named(unchecked, "coefficients.yaml")) / (1.004 * 1.004), 1e-4 * 1.5e-6);
+}
+
+TEST(DeterministicCampaign, NoChangedBitOfAFittedFolderPassesUnnoticed) {
+  const VirtualCampaign here(short_campaign_text("0, 90, 180", 1), deterministic_config(5).text);
+  const std::string folder = ran(here.command()).folder();
+  (void)ran({kphi(), "fit", folder});
+  (void)ran({kphi(), "verify", folder});
+  std::mt19937_64 random(1);
+  for (const auto& [name, whole] : contents(folder)) {
+    const std::filesystem::path file = std::filesystem::path(folder) / name;
+    results::test::make_writable(file);
+    for (int place = 0; place < 3; ++place) {
+      std::string bytes = whole;
+      bytes[random() % bytes.size()] ^= static_cast<char>(1 << random() % 8);
+      std::ofstream(file, std::ios::binary) << bytes;
+      SCOPED_TRACE(name);
+      (void)ran({kphi(), "verify", folder}, 5);
+      if (!name.ends_with(".h5")) continue;
+      for (const auto& verb : {std::vector<std::string>{"replay", folder},
+                               {"replay", file},
+                               {"fit", folder},
+                               {"export", file, "--to", "csv"}}) {
+        std::vector<std::string> command{kphi()};
+        command.insert(command.end(), verb.begin(), verb.end());
+        EXPECT_THAT(ran(command, 5).err, HasSubstr("SHA-256 does not match the journal")) << verb.front();
+      }
+    }
+    std::ofstream(file, std::ios::binary) << whole;
+  }
+  EXPECT_THAT(ran({kphi(), "verify", folder}).out, HasSubstr("intact"));
 }
 
 TEST(DeterministicCampaign, StopsWithExitCodeFourWhenItsFaultScriptTakesTheStreamAway) {

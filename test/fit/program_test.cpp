@@ -2,10 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "fit/model/step_selection.hpp"
+#include "fit/model/thrust_fit.hpp"
 #include "results/file_layer.hpp"
 #include "results/steps_csv.hpp"
 #include "test/end_to_end/process.hpp"
@@ -178,6 +182,28 @@ TEST_F(Program, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
   EXPECT_EQ(kphi({"fit", folder, "--no-report", "--accept"}).code, 0);
 }
 
+TEST_F(Program, FitsALogWithoutOcclusionsToKTAlone) {
+  const std::string folder = steps("5x3");
+  auto log = results::read_steps(folder + "/steps.csv");
+  std::erase_if(log, [](const auto& step) { return step.occlusion_deg != 0; });
+  results::write_steps(folder + "/steps.csv", log);
+  const Answer fit = kphi({"fit", folder});
+  EXPECT_EQ(fit.code, 0) << fit.err;
+  EXPECT_THAT(fit.out, AllOf(HasSubstr("K_T alone, no k(φ) to fly with"), HasSubstr("± is 95 %")));
+  EXPECT_FALSE(std::filesystem::exists(folder + "/coefficients.yaml")) << "nothing to fly with";
+  const std::string page = results::read_text(folder + "/report.html");
+  EXPECT_THAT(page, AllOf(HasSubstr("no occlusion was measured"), HasSubstr("Uncertainty budget")));
+  ASSERT_EQ(kphi({"report", folder}).code, 0);
+  EXPECT_TRUE(results::read_text(folder + "/report.html") == page);
+  const json found = json::parse(kphi({"fit", folder, "--no-report", "--json"}).out);
+  EXPECT_TRUE(found.at("coefficients").is_null());
+  EXPECT_TRUE(found.at("curve").is_null());
+  EXPECT_EQ(found.at("verdict"), "no_curve");
+  EXPECT_NEAR(found.at("K_T").get<double>() / fit_thrust(points_of(log)).parameters.k, 1, 1e-4) << "by the slow steps";
+  expect_refused({"fit", folder, "--out", folder + "/c.yaml"}, 2, "no coefficient file can be written");
+  expect_refused({"export", folder, "--to", "px4"}, 2, "not fitted yet");
+}
+
 TEST_F(Program, TellsAllItFoundAsJson) {
   const Answer fit = kphi({"fit", steps("5x3"), "--no-report", "--json"});
   ASSERT_EQ(fit.code, 0);
@@ -194,6 +220,61 @@ TEST_F(Program, ExplainsEveryCommand) {
     EXPECT_THAT(help.out, HasSubstr("kphi " + std::string(command))) << "an example to type";
     EXPECT_THAT(help.out, Not(HasSubstr("ENUM"))) << "a word of the program's own inside";
   }
+}
+
+/// A certified problem of NIST as a table of k over φ. Through the origin: with k = 0 at φ = 0, where the line starts.
+struct NistTable {
+  std::string text = "phi_deg,k_n_s2_per_rad2\n";
+  std::vector<std::array<double, 2>> certified;  ///< estimate and its standard deviation, one per term
+  double residual_deviation = 0;
+  bool through_origin = false;
+};
+
+NistTable nist(const std::string& name) {
+  NistTable table;
+  std::istringstream lines(results::read_text(std::string(test::source_dir()) + "/test/fit/nist/" + name + ".txt"));
+  for (std::string line, word, x, y; std::getline(lines, line);) {
+    std::istringstream words(line);
+    words >> word >> y >> x;
+    if (word == "data") table.text += x + "," + y + "\n";
+    if (word == "certified") table.certified.push_back({std::stod(y), std::stod(x)});
+    if (word == "residual_deviation") table.residual_deviation = std::stod(y);
+    if (word == "model") table.through_origin = line.ends_with("1 1");
+  }
+  if (table.through_origin) table.text += "0,0\n";
+  return table;
+}
+
+TEST_F(Program, FitsTheLinesThatNistCertified) {
+  for (const char* name : {"Norris", "NoInt1", "NoInt2"}) {
+    const NistTable problem = nist(name);
+    std::vector<std::string> fit{"fit", file(std::string(name) + ".csv", problem.text), "--json", "--no-report"};
+    if (problem.through_origin) fit.emplace_back("--anchored");
+    const Answer answer = kphi(fit);
+    EXPECT_EQ(answer.code, 5) << "no drone flies on it";
+    EXPECT_THAT(answer.err, HasSubstr("no coefficient file was written"));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "coefficients.yaml"));
+    const auto json = nlohmann::json::parse(answer.out);
+    std::vector<nlohmann::json> terms{json["curve"]["intercept"], json["curve"]["slope_per_deg"]};
+    if (problem.through_origin) terms.erase(terms.begin());
+    ASSERT_EQ(terms.size(), problem.certified.size());
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      EXPECT_NEAR(terms[i]["value"].get<double>() / problem.certified[i][0], 1, 1e-10) << name;
+      EXPECT_NEAR(terms[i]["u"].get<double>() / problem.certified[i][1], 1, 1e-10) << name;
+    }
+    EXPECT_NEAR(json["scatter"].get<double>() / problem.residual_deviation, 1, 1e-10) << name;
+  }
+}
+
+TEST_F(Program, FitsATableThatCannotFlyAsFarAsItGoes) {
+  const Answer twice =
+      kphi({"fit", file("twice.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n90,1.2e-6\n90,1.1e-6\n180,8e-7\n")});
+  EXPECT_EQ(twice.code, 5);
+  EXPECT_THAT(twice.out, AllOf(HasSubstr("do not fly yet"), HasSubstr("phi_deg 90 is listed twice"),
+                               HasSubstr("by the scatter of 4 points about the line; no u of k was given")));
+  const Answer without = kphi({"fit", file("without.csv", "phi_deg,k_n_s2_per_rad2\n90,1.2e-6\n180,8e-7\n")});
+  EXPECT_EQ(without.code, 5);
+  EXPECT_THAT(without.out, AllOf(HasSubstr("it has no k at phi_deg 0"), Not(HasSubstr("slope      -4.44444e-09 ±"))));
 }
 
 }  // namespace program_test

@@ -298,5 +298,51 @@ TEST(BenchConfig, MayLimitWhatItsStandTolerates) {
   EXPECT_THAT(refused_limit("cooling: {}"), ElementsAre(testing::HasSubstr("cooling is not a key of limits")));
 }
 
+TEST(BenchConfig, MayGiveItsSimulatedStandALawAndDefects) {
+  const SimulatedStand plain = parse_bench(with_power("simulation: {in_process: true}\n"), "b.yaml").simulation->stand;
+  EXPECT_FALSE(plain.law || plain.zero_walk_n);
+  EXPECT_EQ(plain.mounting, 0);
+  const SimulatedStand stand =
+      parse_bench(
+          with_power("simulation:\n"
+                     "  in_process: true\n"
+                     "  stand:\n"
+                     "    law: {K_T_n_s2_per_rad2: 1.55e-6, intercept_n_s2_per_rad2: 1.6e-6, "
+                     "slope_n_s2_per_rad2_deg: -4.5e-9}\n"
+                     "    bend: 0.01\n"
+                     "    rise_per_krad_s: 0.05\n"
+                     "    mounting: 0.003\n"
+                     "    zero_walk_n: 0.007\n"
+                     "    slow_noise_n: 0.001\n"
+                     "    slow_noise_s: 2\n"
+                     "    plates: [{named_deg: 90, true_deg: 180}, {named_deg: 45, true_deg: 55, repetition: 2}]\n"),
+          "b.yaml")
+          .simulation->stand;
+  ASSERT_TRUE(stand.law);
+  EXPECT_EQ(stand.law->K_T, 1.55e-6);
+  EXPECT_EQ(stand.law->intercept, 1.6e-6);
+  EXPECT_EQ(stand.law->slope_per_deg, -4.5e-9);
+  EXPECT_EQ(stand.bend, 0.01);
+  EXPECT_EQ(stand.rise_per_krad_s, 0.05);
+  EXPECT_EQ(stand.mounting, 0.003);
+  EXPECT_EQ(stand.zero_walk_n, 0.007);
+  EXPECT_EQ(stand.slow_noise_n, 0.001);
+  EXPECT_EQ(stand.slow_noise_s, 2);
+  ASSERT_EQ(stand.plates.size(), 2u);
+  EXPECT_EQ(stand.plates[0].true_deg, 180);
+  EXPECT_FALSE(stand.plates[0].repetition);
+  EXPECT_EQ(stand.plates[1].repetition, 2);
+}
+
+TEST(BenchConfig, RefusesAPlateOfOneRepetitionWhereTheBenchDoesNotKnowIt) {
+  EXPECT_THAT(refusals([] {
+                return parse_bench(
+                    with_power("simulation: {control: c, stand: {plates: [{named_deg: 90, true_deg: 100, "
+                               "repetition: 2}]}}\n"),
+                    "b.yaml");
+              }),
+              ElementsAre(testing::HasSubstr("does not know its repetitions")));
+}
+
 }  // namespace bench_config_test
 }  // namespace kphi::profiles

@@ -103,6 +103,19 @@ TEST_F(VerifiedCampaign, EveryFlippedByteOfARunShows) {
   }
 }
 
+TEST_F(VerifiedCampaign, NoCommandTakesARunThatWasChanged) {
+  EXPECT_NO_THROW(require_unchanged_run(run_, digests_beside(run_)));
+  EXPECT_NO_THROW(require_unchanged_run(run_, {})) << "by its own checksums";
+  test::make_writable(run_);
+  std::string bytes = read_text(run_);
+  bytes[bytes.find("5 inch, 3 blades")] = '6';
+  std::ofstream(run_, std::ios::binary) << bytes;
+  EXPECT_THAT(test::error_of<DataRejected>([&] { require_unchanged_run(run_, digests_beside(run_)); }),
+              HasSubstr("SHA-256 does not match the journal; restore it from a copy"));
+  std::filesystem::remove(folder_.journal());
+  EXPECT_THROW(require_unchanged_run(run_, digests_beside(run_)), DataRejected);
+}
+
 TEST_F(VerifiedCampaign, AMissingAndAnUnknownRunShow) {
   std::filesystem::rename(run_, folder_.run("5x3", 90, -1));
   const auto problems = verify_campaign(folder_).problems;

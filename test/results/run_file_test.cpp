@@ -9,6 +9,8 @@
 #include <thread>
 
 #include "results/file_layer.hpp"
+#include "results/hdf5.hpp"
+#include "results/reduction/clock_map.hpp"
 #include "results/run_reader.hpp"
 #include "results/run_writer.hpp"
 #include "test/results/recordings.hpp"
@@ -69,6 +71,42 @@ TEST_F(RunFile, KeepsWhatHappenedToTheStreamItsHealthAndTheBoxesBias) {
   }
 }
 
+TEST_F(RunFile, WithoutViewsHasNoSampleTimesAndNoPlot) {
+  RunWriter writer(path, run.header);
+  write_pieces(writer, run);
+  (void)writer.finish(run);
+  EXPECT_TRUE(verify_run(path).whole());
+  const auto root = hdf5::open_file(path);
+  EXPECT_FALSE(hdf5::has_attribute(root, "default"));
+}
+
+TEST_F(RunFile, HoldsTheTimeOfEachSampleAndAPlot) {
+  run = make_run({.records_per_datagram = 40});
+  write_run(path, run);
+  const auto root = hdf5::open_file(path);
+  const auto cell = hdf5::open_group(root, "load_cell"), plot = hdf5::open_group(root, "plot");
+  std::vector<Nanoseconds> times(run.load_cell.size());
+  hdf5::ColumnReader(cell, "t_ns", Stored::i64, "a.h5").read(0, times.size(), times.data());
+  EXPECT_EQ(times, sample_times(run));
+  EXPECT_TRUE(std::ranges::is_sorted(times, std::less_equal()));
+
+  hdf5::ColumnReader column(plot, "thrust", Stored::f64, "a.h5");
+  std::vector<double> time(column.rows()), thrust(column.rows()), speed(column.rows());
+  column.read(0, thrust.size(), thrust.data());
+  hdf5::ColumnReader(plot, "time", Stored::f64, "a.h5").read(0, time.size(), time.data());
+  hdf5::ColumnReader(plot, "speed", Stored::f64, "a.h5").read(0, speed.size(), speed.data());
+  EXPECT_NEAR(time[1] - time[0], 0.01, 1e-12);
+  const StepMean last = reduce(run).back();
+  double sum = 0, n = 0;
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    if (time[i] < last.window_begin_s || time[i] > last.window_end_s) continue;
+    sum += thrust[i];
+    ++n;
+    EXPECT_NEAR(speed[i], last.speed_rad_s, 0.01 * last.speed_rad_s);
+  }
+  EXPECT_NEAR(sum / n, last.thrust_n, 0.005);
+}
+
 TEST_F(RunFile, KeepsWhatTheReductionNeedsToKnowOfCampaignAndBench) {
   run.header.supply_voltage_v = 16;
   run.header.coil_temperature_max_degc = 110;
@@ -109,6 +147,8 @@ TEST_F(RunFile, IsDescribedInTheReadme) {
   };
   tell_group(kLoadCellGroup, "`/load_cell/");
   tell_group(kCommandGroup, "`/commands/");
+  tell_group(kPlotGroup, "`/plot/");
+  told(std::string("`/load_cell/") + layout::kSampleTime.name + "`");
   tell_group(kSupplyGroup, "`/supply/");
   tell_group(kEventGroup, "`/events/");
   tell_group(motor_group(kMotorChannels[0]), "`/motor/<channel>/");

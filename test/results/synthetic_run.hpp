@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "results/records.hpp"
+#include "results/reduction/reduction.hpp"
 #include "results/run_writer.hpp"
 #include "results/step_mean.hpp"
 #include "test/temporary_folder.hpp"
@@ -200,7 +201,7 @@ inline void write_pieces(RunWriter& writer, const RunRecording& run, std::size_t
 inline std::string write_run(const std::filesystem::path& path, const RunRecording& run, FileLayer& files = disk()) {
   RunWriter writer(path, run.header, files);
   write_pieces(writer, run);
-  return writer.finish(run);
+  return writer.finish(run, views_of);
 }
 
 }  // namespace kphi::results::test

@@ -8,6 +8,8 @@ namespace {
 
 constexpr int kTicksPerDrift = 70;  // every 10 ms
 constexpr double kDriftInterval = kTicksPerDrift * kTick;
+// Mountings draw from a sequence of their own, so that the noise stays the same with and without their scatter.
+constexpr std::uint64_t kMountingStream = 0x94d049bb'133111ebull;
 
 }  // namespace
 
@@ -25,7 +27,8 @@ void LoadCell::load(const AirLoad& air) noexcept {
 void LoadCell::step(double speed, double reaction_torque, Random& random) noexcept {
   rotate(speed);
   const double square = speed * std::abs(speed);
-  thrust_ += kTick / parameters_.thrust_lag * (air_.thrust * square - thrust_);
+  const double k = air_.thrust * (1 + air_.rise_per_krad_s * (std::abs(speed) / 1000 - 1));
+  thrust_ += kTick / parameters_.thrust_lag * (k * square - thrust_);
 
   const double swing = air_.thrust_unoccluded * square;
   const double double_cosine = cosine_ * cosine_ - sine_ * sine_;
@@ -45,6 +48,7 @@ void LoadCell::step(double speed, double reaction_torque, Random& random) noexce
   for (std::size_t axis = 0; axis < load.size(); ++axis) {
     reading_[axis] = load[axis] + zero_[axis] + parameters_.noise[axis] * random.normal();
   }
+  reading_[2] += slow_noise_;
 }
 
 void LoadCell::rotate(double speed) noexcept {
@@ -66,22 +70,30 @@ void LoadCell::drift(Random& random) noexcept {
     zero_[axis] += parameters_.drift_per_minute[axis] * kMinutes +
                    parameters_.walk_per_root_minute[axis] * kRootMinutes * random.normal();
   }
+  if (parameters_.slow_noise == 0) return;
+  const double kept = std::exp(-kDriftInterval / parameters_.slow_noise_seconds);
+  slow_noise_ = kept * slow_noise_ + parameters_.slow_noise * std::sqrt(1 - kept * kept) * random.normal();
 }
 
-Plant::Plant(const PlantParameters& parameters, std::uint64_t seed) noexcept
+Plant::Plant(const PlantParameters& parameters, std::uint64_t seed)
     : density_share_(parameters.air_density_kg_m3 / 1.225),
+      stand_(parameters.stand),
       random_(seed),
+      mountings_(seed ^ kMountingStream),
       motor_(parameters.motor),
       load_cell_(parameters.load_cell, random_) {
   mount(nullptr, 0);
 }
 
-void Plant::mount(const PropellerTruth* propeller, double occlusion_deg) noexcept {
+void Plant::mount(const PropellerTruth* propeller, double named_deg) {
   air_ = AirLoad{};
   shaft_ = ShaftLoad{};
   if (propeller != nullptr) {
-    air_.thrust = density_share_ * sim::thrust_coefficient(*propeller, occlusion_deg);
-    air_.thrust_unoccluded = density_share_ * sim::thrust_coefficient(*propeller, 0);
+    const double occlusion_deg = stand_.true_deg(named_deg);
+    const double mounted = 1 + stand_.mounting * mountings_.normal();
+    air_.thrust = density_share_ * stand_.k(*propeller, occlusion_deg) * mounted;
+    air_.thrust_unoccluded = density_share_ * stand_.k(*propeller, 0);
+    air_.rise_per_krad_s = stand_.rise_per_krad_s;
     air_.blades = propeller->blades;
     air_.occluded_share = occlusion_deg / 360;
     shaft_.drag = density_share_ * sim::torque_coefficient(*propeller, occlusion_deg);

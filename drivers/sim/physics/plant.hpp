@@ -8,6 +8,7 @@
 #include "base/clock.hpp"
 #include "base/random.hpp"
 #include "drivers/sim/physics/motor.hpp"
+#include "drivers/sim/physics/stand.hpp"
 #include "drivers/sim/physics/truth.hpp"
 
 namespace kphi::sim {
@@ -27,6 +28,8 @@ struct LoadCellParameters {
   Wrench zero_spread{0.3, 0.3, 0.4, 5e-3, 5e-3, 3e-3};              ///< zero offset of a power-up: uniform within ±
   Wrench drift_per_minute{8e-4, -6e-4, 2e-3, 2e-5, -2e-5, 1e-5};    ///< linear
   Wrench walk_per_root_minute{2e-4, 2e-4, 4e-4, 6e-6, 6e-6, 6e-6};  ///< random walk: deviation after one minute
+  double slow_noise = 0;              ///< deviation in Fz, N, of noise with a memory of slow_noise_seconds
+  double slow_noise_seconds = 1;      ///< its correlation falls to 1/e in this time
   double once_per_turn = 0.015;       ///< amplitude in Fz, as a share of the unoccluded thrust; Fx, Fy the same
   double blade_pass = 0.03;           ///< amplitude in Fz, as a share of the unoccluded thrust
   double blade_pass_occluded = 0.05;  ///< more of it with half the disk occluded
@@ -34,10 +37,11 @@ struct LoadCellParameters {
 
 /// The aerodynamic part of one mounting.
 struct AirLoad {
-  double thrust = 0;             ///< k(φ), N/(rad/s)²
+  double thrust = 0;             ///< k(φ) at 1000 rad/s, N/(rad/s)²
   double thrust_unoccluded = 0;  ///< K_T, N/(rad/s)²
   int blades = 2;
-  double occluded_share = 0;  ///< 0..1 of the disk
+  double occluded_share = 0;   ///< 0..1 of the disk
+  double rise_per_krad_s = 0;  ///< of k with the speed, share
 };
 
 /// The load on the cell under the motor: thrust with its lag, drag torque, vibration, noise, zero and drift.
@@ -58,6 +62,7 @@ class LoadCell {
   LoadCellParameters parameters_;
   AirLoad air_;
   Wrench zero_{};
+  double slow_noise_ = 0;  ///< N, now
   Wrench reading_{};
   double thrust_ = 0;
   double cosine_ = 1, sine_ = 0;  ///< of the rotor angle
@@ -68,15 +73,16 @@ class LoadCell {
 struct PlantParameters {
   MotorParameters motor;
   LoadCellParameters load_cell;
+  StandParameters stand;
   double air_density_kg_m3 = 1.225;  ///< thrust and drag are those of truth.hpp at 1.225 and proportional to it
 };
 
 class Plant {
  public:
-  Plant(const PlantParameters& parameters, std::uint64_t seed) noexcept;
+  Plant(const PlantParameters& parameters, std::uint64_t seed);
 
-  /// nullptr: the bare motor. Occlusion in degrees, [0, 360).
-  void mount(const PropellerTruth* propeller, double occlusion_deg) noexcept;
+  /// nullptr: the bare motor. The occlusion by its name, degrees, [0, 360).
+  void mount(const PropellerTruth* propeller, double named_deg);
   /// Advances by 1/7000 s.
   void step(const PowerStage& stage) noexcept;
   /// See Motor::power.
@@ -91,7 +97,9 @@ class Plant {
 
  private:
   double density_share_;  ///< of 1.225 kg/m³
+  StandParameters stand_;
   Random random_;
+  Random mountings_;
   Motor motor_;
   LoadCell load_cell_;
   AirLoad air_;

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
-#include <string>
 #include <string_view>
 
 namespace kphi::sim {
@@ -41,8 +39,5 @@ inline constexpr std::array<double, 5> kOcclusionsDeg{0, 45, 90, 180, 270};
 
 /// k_Q(φ) in N m/(rad/s)²: an occlusion takes a little of the torque, 8 % at 360°.
 [[nodiscard]] double torque_coefficient(const PropellerTruth& propeller, double occlusion_deg) noexcept;
-
-/// The truth as YAML: per propeller K_T, k per occlusion and the line, all in N/(rad/s)² (slope per degree).
-[[nodiscard]] std::string truth_yaml(std::uint64_t seed);
 
 }  // namespace kphi::sim

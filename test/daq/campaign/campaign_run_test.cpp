@@ -18,8 +18,9 @@ TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
   EXPECT_EQ(result.steps, 12);
   EXPECT_EQ(result.lost, 0u);
   EXPECT_EQ(results_->complete_runs().size(), 4u);
-  EXPECT_THAT(journaled(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted", "run_accepted",
-                                       "repetitions_judged", "mounted", "run_accepted", "run_accepted",
+  EXPECT_THAT(journaled(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted",
+                                       "tables_written", "run_accepted", "tables_written", "repetitions_judged",
+                                       "mounted", "run_accepted", "tables_written", "run_accepted", "tables_written",
                                        "repetitions_judged", "campaign_finished"));
 }
 
@@ -48,8 +49,8 @@ TEST_F(ShortCampaign, KeepsFinishedRunsWhenAMountingIsRefused) {
   EXPECT_THROW((void)run(test::short_campaign("0, 90", 1, 3)), NotMounted);
   EXPECT_EQ(results_->complete_runs().size(), 1u);
   EXPECT_EQ(steps().size(), 3u);
-  EXPECT_THAT(journaled(),
-              ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted", "campaign_stopped"));
+  EXPECT_THAT(journaled(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted",
+                                       "tables_written", "campaign_stopped"));
 }
 
 TEST_F(ShortCampaign, JournalsWhyARunWasStopped) {

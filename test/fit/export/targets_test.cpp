@@ -83,6 +83,64 @@ TEST_F(Yaml, OfRos2IsReadByPythonWithDoublesAndListsOfOneType) {
   EXPECT_THAT(to_ros2(file(), {}).lost, Contains(HasSubstr("air_density"))) << "what is unknown is said, not invented";
 }
 
+/// The same propeller, its torque measured: 0.013 m times the thrust.
+const compensation::Coefficients& file_with_torque() {
+  static const compensation::Coefficients kOnce = [] {
+    std::vector<results::StepMean> steps = campaign_steps();
+    for (results::StepMean& step : steps) {
+      step.torque_nm = -0.013 * step.thrust_n;
+      step.torque_sd_nm = 1e-4;
+    }
+    return compensation::parse_coefficients(format_coefficients(analysed(identify(steps)), {}), "c.yaml");
+  }();
+  return kOnce;
+}
+
+/// Values of PX4's parameters by name.
+std::map<std::string, double> px4_values(const Export& result) {
+  std::istringstream lines(result.text);
+  std::map<std::string, double> values;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    int vehicle = 0, component = 0;
+    std::string name;
+    double value = 0;
+    std::istringstream(line) >> vehicle >> component >> name >> value;
+    values[name] = value;
+  }
+  return values;
+}
+
+TEST(Px4, TorqueHasTheSignOfTheDirectionAndIsLeftOutWithoutOne) {
+  using enum Turn;
+  const ExportOptions known{.speed_max_rpm = 19100,
+                            .turns = {counter_clockwise, counter_clockwise, clockwise, clockwise}};
+  auto values = px4_values(to_px4(file_with_torque(), known));
+  EXPECT_NEAR(values["CA_ROTOR0_KM"], 0.013, 1e-5);
+  EXPECT_NEAR(values["CA_ROTOR3_KM"], -0.013, 1e-5);
+  const Export unknown = to_px4(file_with_torque(), {.speed_max_rpm = 19100});
+  EXPECT_FALSE(px4_values(unknown).contains("CA_ROTOR0_KM")) << "a wrong sign crashes the vehicle";
+  EXPECT_THAT(unknown.lost, Contains(HasSubstr("CA_ROTORn_KM: 0.013")));
+  EXPECT_THAT(to_px4(file(), known).lost, Contains(HasSubstr("the coefficient file has none")));
+  EXPECT_THROW((void)to_px4(file_with_torque(), {.turns = {clockwise}}), ConfigurationError) << "four motors";
+  EXPECT_THROW((void)parse_turns("ccw,left"), ConfigurationError);
+  EXPECT_EQ(parse_turns("ccw,cw"), (std::vector{counter_clockwise, clockwise}));
+}
+
+TEST(TorquePerThrust, GrowsWithTheOcclusionAsTheThrustFalls) {
+  const auto kappa = [](const ExportOptions& options) {
+    const std::string text = to_agilicious(file_with_torque(), options).text;
+    return std::strtod(text.c_str() + text.find("kappa: ") + 7, nullptr);
+  };
+  EXPECT_NEAR(kappa({}), 0.013, 1e-5);
+  EXPECT_NEAR(kappa({.phi_deg = 180}), 0.013, 5e-4) << "here torque and thrust fall alike";
+  EXPECT_THAT(to_agilicious(file_with_torque(), {}).text, HasSubstr("torque per thrust, 0.013"));
+  EXPECT_THAT(to_agilicious(file(), {}).lost, Contains(HasSubstr("torque: the coefficient file has none")));
+  const std::string sdf = to_gazebo(file_with_torque(), {.turns = parse_turns("ccw,cw,ccw,cw")}).text;
+  EXPECT_NEAR(std::strtod(sdf.c_str() + sdf.find("<momentConstant>") + 16, nullptr), 0.013, 1e-5);
+  EXPECT_THAT(sdf, HasSubstr("<turningDirection>cw</turningDirection>"));
+}
+
 TEST(Px4, ParametersAreForceAtFullOutput) {
   const Export result = to_px4(file(), {.speed_max_rpm = 20000, .motors = 3});
   std::istringstream lines(result.text);

@@ -53,7 +53,7 @@ TEST(KTable, NeverAssumesAUnit) {
 }
 
 TEST(KTable, NamesTheLineThatIsWrong) {
-  for (const char* bad : {"phi_deg\n0\n", "k\n1\n", "phi_deg,k\n0\n", "phi_deg,k\n0,x\n", "phi_deg,k\n400,1e-6\n",
+  for (const char* bad : {"phi_deg\n0\n", "k\n1\n", "phi_deg,k\n0\n", "phi_deg,k\n0,x\n", "phi_deg,k\n-1,1e-6\n",
                           "phi_deg,k\n0,-1e-6\n", ""}) {
     EXPECT_THROW((void)read_k_table(bad, "K.csv", "N/(rad/s)^2"), ConfigurationError) << bad;
   }

@@ -213,7 +213,7 @@ TEST_F(RealData, OfTheSeries1520HasItsKnownDirtAndNoOther) {
   EXPECT_EQ(tally[FindingKind::speed_missing].rows, 43u) << "speed 0 with more than 5 gf";
   EXPECT_EQ(tally[FindingKind::speed_missing].files, 43u);
   EXPECT_EQ(tally[FindingKind::current_limit].files, 36u);
-  EXPECT_EQ(tally[FindingKind::negative_thrust].rows, 30u);
+  EXPECT_EQ(tally[FindingKind::negative_thrust].rows, 1u) << "29 others are below 0 by noise alone";
   for (const char* file : {"e5_7", "f1_7", "f4_11", "f6_11", "h1_11"})
     EXPECT_NE(find(all.at(file), FindingKind::barely_turning), nullptr) << file << " has a row of 1 or 2 RPM";
   EXPECT_EQ(find(all.at("a3_11"), FindingKind::current_limit)->rows, 2u);
@@ -290,7 +290,7 @@ TEST_F(RealData, OfTimeSeriesHaveTheirKnownDirt) {
                                    {kConstant, FindingKind::zero_missing, 0},
                                    {kConstant, FindingKind::other_fields, 1},
                                    {kRun, FindingKind::speed_spike, 156, "59504"},
-                                   {kRun, FindingKind::negative_thrust, 540},
+                                   {kRun, FindingKind::negative_thrust, 534},
                                    {kRun, FindingKind::time_backward, 151},
                                    {kRun, FindingKind::time_repeated, 1},
                                    {kRun, FindingKind::thrust_drifts, 0},

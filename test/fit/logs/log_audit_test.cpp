@@ -174,6 +174,26 @@ TEST(LogAudit, CountsIndependentRows) {
   EXPECT_EQ(correlation_time({1, 1, 1, 1}), 1);
 }
 
+TEST(LogAudit, TakesNoiseAtRestForNoNegativeThrust) {
+  StandLog log = series();
+  for (const LogFinding& finding : audit(log, {})) EXPECT_NE(finding.kind, FindingKind::negative_thrust);
+  log.rows[100].thrust_n = -0.1;
+  EXPECT_TRUE(std::ranges::any_of(audit(log, {}), [](const LogFinding& finding) {
+    return finding.kind == FindingKind::negative_thrust && finding.rows == 1;
+  }));
+}
+
+TEST(LogAudit, SeesThePoleCountBesideOneDoubledReading) {
+  StandLog log = sweep();
+  log.rows.resize(9);
+  for (StandRow& row : log.rows) row.optical_rpm = *row.electrical_rpm * 7 / 6;
+  log.rows[4].electrical_rpm = *log.rows[4].electrical_rpm * 2;
+  const auto findings = audit(log, {});
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings.front().kind, FindingKind::speed_ratio);
+  EXPECT_THAT(findings.front().text, HasSubstr("7/6"));
+}
+
 TEST(GroupOutliers, NeedAGroupAndADistance) {
   std::vector<NamedCoefficient> group;
   for (int i = 0; i < 8; ++i) group.push_back({"f" + std::to_string(i), 1e-6 * (1 + 0.01 * (i % 3))});

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+
 #include "base/error.hpp"
 #include "compensation/units.hpp"
 #include "fit/logs/import_table.hpp"
@@ -79,7 +82,7 @@ TEST(NamedColumns, ListsTheLinesItCannotUse) {
   const auto log = read_columns("f (N),n (rpm),phi (deg),rep\n,1,0,1\n1,2,400,1\n1,2,45,1.5\n1,2,45,2\n", "own.csv",
                                 roles({"thrust=f", "speed=n", "occlusion=phi", "repetition=rep"}));
   ASSERT_EQ(log.problems.size(), 3u);
-  EXPECT_THAT(log.problems[0].what, HasSubstr("thrust is not a number"));
+  EXPECT_THAT(log.problems[0].what, HasSubstr("thrust is missing; line skipped"));
   EXPECT_THAT(log.problems[1].what, HasSubstr("outside 0 to 360°"));
   EXPECT_THAT(log.problems[2].what, HasSubstr("not a whole number"));
   ASSERT_EQ(log.rows.size(), 1u);
@@ -204,6 +207,50 @@ TEST(Rcbenchmark, RefusesATareThatScatters) {
   for (int i = 0; i < 10; ++i) rows += fmt::format("{},1000,{},0,0,11,,\n", i, i % 2 == 0 ? 50 : -50);
   EXPECT_THAT(table_refusal(table(rows + "10,1500,1000,9000,0,11,,\n"), {.tare_rows = 10}),
               HasSubstr("cannot give a zero"));
+}
+
+TEST(Rcbenchmark, SaysThatASpeedIsBlindBeforeItSaysReversed) {
+  std::string text = "Time (s),ESC signal (µs),Thrust (N),Motor Electrical Speed (RPM),Motor Optical Speed (RPM)\n";
+  for (int i = 0; i < 20; ++i) text += fmt::format("{},1500,3.0,0,{}\n", i, 6000 + i);
+  for (int i = 0; i < 3; ++i) text += fmt::format("{},1000,-0.02,120,0\n", 20 + i);  // all that the sensor saw
+  const StandLog log = read_rcbenchmark(text, "Polar.csv");
+  EXPECT_THAT(refusal([&] { return select_rows(log); }),
+              HasSubstr("the electrical speed reads 0 in 20 of 20 rows with thrust: its sensor does not see the "
+                        "propeller; take the other with --speed optical"));
+  EXPECT_EQ(select_rows(log, {.speed = SpeedSource::optical}).steps.size(), 20u);
+}
+
+TEST(Rcbenchmark, NamesTheOptionThatReadsADecimalComma) {
+  constexpr const char* kText = "Thrust (N);Motor Optical Speed (RPM)\n1,5;6000\n2,5;7000\n";
+  EXPECT_THAT(refusal([] { return read_rcbenchmark(kText, "log.csv", {.separator = 0}); }),
+              HasSubstr("log.csv:2: \"1,5\" has a decimal comma; import with --decimal-comma"));
+  EXPECT_EQ(read_rcbenchmark(kText, "log.csv", {.separator = 0, .decimal_comma = true}).rows.at(1).thrust_n, 2.5);
+}
+
+TEST(Rcbenchmark, CountsValuesThatAreNoNumbersAndKeepsTheRow) {
+  const StandLog log = read_rcbenchmark(
+      "Thrust (N),Motor Optical Speed (RPM),Voltage (V)\n1.5,6000,12\n2.5,7000,n/a\n3.5,8000,\nnan,9000,12\n",
+      "log.csv");
+  EXPECT_EQ(log.rows.size(), 3u);
+  ASSERT_EQ(log.not_numbers.size(), 1u) << "an empty field says nothing";
+  EXPECT_EQ(log.not_numbers[0].line, 3u);
+  EXPECT_THAT(log.not_numbers[0].what, HasSubstr("voltage \"n/a\" is not a number"));
+  ASSERT_EQ(log.problems.size(), 1u);
+  EXPECT_THAT(log.problems[0].what, HasSubstr("thrust \"nan\" is not a number"));
+}
+
+TEST(Import, NamesWhatReadsUtf16) {
+  const std::string text("\xFF\xFET\0i\0", 6);
+  EXPECT_THAT(refusal([&] { return import_table(text, "log.csv", {}); }), HasSubstr("iconv -f UTF-16 -t UTF-8"));
+}
+
+TEST(Import, WritesItsCoefficientDown) {
+  ImportOptions options;
+  options.columns = roles({"thrust=f:N", "speed=n:RPM"});
+  constexpr const char* kText = "f,n\n1,5000\n4,10000\n9,15000\n";
+  const auto record =
+      nlohmann::json::parse(import_record(import_table(kText, "log.csv", options), kText, "log.csv", options, "1"));
+  EXPECT_NEAR(record["k_n_s2_per_rad2"].get<double>(), 4 / std::pow(from_rpm(10000).value(), 2), 1e-15);
 }
 
 }  // namespace stand_log_test

@@ -53,7 +53,7 @@ inline KnownLog averaged_sweep(double k, const SweepDefects& defects = {}) {
     double gram = newtons(k, rpm) / kGramForce;
     if (i == 0 && defects.speed_missing) rpm = 0;
     if (i == 0 && defects.barely_turning) rpm = 2, gram = 0.3;
-    if (i == 0 && defects.negative) rpm = 0, gram = -0.4;
+    if (i == 0 && defects.negative) rpm = 0, gram = -40;
     if (rpm > 0) log.used.push_back({from_rpm(rpm).value(), gram * kGramForce, 1});
     log.text += fmt::format("{},{},,{},{},{},{},0,{},,\n", 2.2 * i, 1050 + 95 * i, gram, volts, 0.4 + i, rpm,
                             volts * (0.4 + i));

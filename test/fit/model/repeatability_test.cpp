@@ -37,7 +37,7 @@ TEST(OutlyingRuns, AreNamedAndKeptAndWidenTheBudget) {
     EXPECT_EQ(found.selection.used.size(), whole.selection.used.size());
     EXPECT_GT(found.table[0].standard_error, whole.table[0].standard_error) << "repetitions are pooled over phi";
   }
-  EXPECT_GE(named, 38) << "ten times what repetitions scatter";
+  EXPECT_GE(named, 36) << "ten times what repetitions scatter, but zeros jump, too";
   EXPECT_THAT(analyse(identify(with_one_run_off(2, 0.03))).remarks,
               Contains(HasSubstr("repetition 2 at 90° stands out")));
 }

@@ -158,4 +158,28 @@ TEST(ClockMap, BeginsAnewWhereTheBoxTookUpCountingAgain) {
   EXPECT_FALSE(std::abs(unaware.epochs()[0].skew) < 500e-6) << "without the break the clock seems far off";
 }
 
+TEST(SampleTimes, AreStrictlyIncreasingAndTheSamplesOwn) {
+  const Truth truth = stream_of(40, 40, 20);
+  RunRecording run = make_run(truth);
+  run.header.load_cell.device_rate_hz = 7000;
+  const std::vector<Nanoseconds> times = sample_times(run);
+  ASSERT_EQ(times.size(), run.load_cell.size());
+  double worst = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const double n = static_cast<double>(run.load_cell[i].ft_sequence - truth.ft_begin);
+    const double sampled_ns = 1e9 * n * (1 + 1e-6 * truth.skew_ppm) / truth.rate_hz;
+    worst = std::max(worst, std::abs(static_cast<double>(times[i]) - sampled_ns - 1e3 * truth.delay_us));
+    if (i > 0) ASSERT_GT(times[i], times[i - 1]) << i;
+  }
+  EXPECT_LT(worst, 10e3) << "ns, beside the smallest delay of the wire";
+}
+
+TEST(SampleTimes, WithoutARateAreTheArrivals) {
+  RunRecording run = make_run(stream_of(0, 40, 20));
+  run.header.load_cell.device_rate_hz = 0;
+  const std::vector<Nanoseconds> times = sample_times(run);
+  EXPECT_EQ(times.front(), run.load_cell.front().arrival_ns);
+  for (std::size_t i = 1; i < times.size(); ++i) ASSERT_GT(times[i], times[i - 1]);
+}
+
 }  // namespace kphi::results::clock_map_test

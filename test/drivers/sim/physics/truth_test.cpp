@@ -1,4 +1,4 @@
-#include "drivers/sim/physics/truth.hpp"
+#include "drivers/sim/physics/stand.hpp"
 
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
