@@ -91,40 +91,60 @@ void take_row(Table& table, TableRow& row, const TakeRow& take) {
   }
 }
 
-Table read_table(std::string_view text, std::string path, const auto& split, const TakeRow& take = {}) {
-  Table table;
-  table.path = std::move(path);
-  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  TableRow row;
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::string_view line = next_line(text);
-    if (trimmed(line).empty()) continue;
-    row.line = number;
-    const bool closed = split(line, row.fields);
-    if (table.header_line != 0) {
-      if (closed)
-        take_row(table, row, take);
-      else
-        table.problems.push_back({number, "a quoted field is not closed; line skipped"});
-      continue;
-    }
-    table.header_line = number;
-    if (!closed) {
-      table.problems.push_back({number, "a quoted field of the header is not closed"});
-      return table;
-    }
-    table.header = row.fields;
-    if (table.header.size() > 1 && table.header.back().empty()) table.header.pop_back();
+/// From lines to a table: first the header, then rows.
+class TableReader {
+ public:
+  /// After `line` lines of a table that may have its header.
+  TableReader(Table begin, std::size_t line, const TakeRow& take) : table_(std::move(begin)), take_(take) {
+    row_.line = line;
   }
-  return table;
-}
 
-char likely_separator(std::string_view text) {
-  const std::string_view header = next_line(text);
-  char likely = ',';
-  for (const char candidate : {';', '\t'})
-    if (std::ranges::count(header, candidate) > std::ranges::count(header, likely)) likely = candidate;
-  return likely;
+  /// Of a block of whole lines.
+  void read(std::string_view lines, const auto& split) {
+    while (!lines.empty() && !given_up_) {
+      ++row_.line;
+      const std::string_view line = next_line(lines);
+      if (!trimmed(line).empty()) take_line(split(line, row_.fields));
+    }
+  }
+
+  [[nodiscard]] Table table() && { return std::move(table_); }
+
+ private:
+  /// `closed`: the quotes of the line are.
+  void take_line(bool closed) {
+    if (table_.header_line == 0) {
+      take_header(closed);
+    } else if (closed) {
+      take_row(table_, row_, take_);
+    } else {
+      table_.problems.push_back({row_.line, "a quoted field is not closed; line skipped"});
+    }
+  }
+
+  void take_header(bool closed) {
+    table_.header_line = row_.line;
+    given_up_ = !closed;
+    if (!closed) {
+      table_.problems.push_back({row_.line, "a quoted field of the header is not closed"});
+      return;
+    }
+    table_.header = row_.fields;
+    if (table_.header.size() > 1 && table_.header.back().empty()) table_.header.pop_back();
+  }
+
+  Table table_;
+  TableRow row_;  ///< the memory of the line at hand
+  const TakeRow& take_;
+  bool given_up_ = false;
+};
+
+Table read_table(TextBlocks text, std::string path, const auto& split, const TakeRow& take = {}) {
+  TableReader reader({.path = std::move(path)}, 0, take);
+  std::string_view block = text.front();
+  if (block.starts_with(kByteOrderMark)) block.remove_prefix(kByteOrderMark.size());
+  for (; !block.empty(); text.pop(), block = text.front()) reader.read(block, split);
+  return std::move(reader).table();
 }
 
 }  // namespace
@@ -147,15 +167,30 @@ std::optional<std::vector<std::string>> split_csv_line(std::string_view line, ch
   return split_separated(line, separator, fields) ? std::optional(std::move(fields)) : std::nullopt;
 }
 
-Table read_csv(std::string_view text, std::string path, char separator, const TakeRow& take) {
-  if (separator == 0) separator = likely_separator(text);
+char likely_separator(std::string_view text) {
+  const std::string_view header = next_line(text);
+  char likely = ',';
+  for (const char candidate : {';', '\t'})
+    if (std::ranges::count(header, candidate) > std::ranges::count(header, likely)) likely = candidate;
+  return likely;
+}
+
+Table read_csv(TextBlocks text, std::string path, char separator, const TakeRow& take) {
+  if (separator == 0) separator = likely_separator(text.front());
   return read_table(
-      text, std::move(path),
+      std::move(text), std::move(path),
       [separator](std::string_view line, Fields& fields) { return split_separated(line, separator, fields); }, take);
 }
 
-Table read_blank_separated(std::string_view text, std::string path) {
-  return read_table(text, std::move(path), split_blanks);
+Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator, const TakeRow& take) {
+  TableReader reader({begin.path, begin.header_line, begin.header}, line - 1, take);
+  reader.read(block,
+              [separator](std::string_view text, Fields& fields) { return split_separated(text, separator, fields); });
+  return std::move(reader).table();
+}
+
+Table read_blank_separated(TextBlocks text, std::string path) {
+  return read_table(std::move(text), std::move(path), split_blanks);
 }
 
 std::optional<double> parse_number(std::string_view field) { return parse_finite(trimmed(field)); }

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "base/text.hpp"
+
 namespace kphi {
 
 struct TableRow {
@@ -37,12 +39,20 @@ struct Table {
 /// quote in it doubled. Empty lines are skipped. Separator 0: the one of , ; tab that the header line has most of.
 /// With `take` each row is handed over, with the table so far, and not kept.
 using TakeRow = std::function<void(const Table&, const TableRow&)>;
-[[nodiscard]] Table read_csv(std::string_view text, std::string path, char separator = ',', const TakeRow& take = {});
+[[nodiscard]] Table read_csv(TextBlocks text, std::string path, char separator = ',', const TakeRow& take = {});
+
+/// Rows of a later block of whole lines of a table that is known by `begin`, its header and path; `line`: the number of
+/// the first one. What it returns holds the problems of the block.
+[[nodiscard]] Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator,
+                                  const TakeRow& take);
+
+/// , ; or tab: the one that the header line has most of.
+[[nodiscard]] char likely_separator(std::string_view text);
 
 /// The fields of one line of such a table; nullopt if its quotes do not close, or text follows a closing quote.
 [[nodiscard]] std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator = ',');
 /// Separated by blanks or tabs.
-[[nodiscard]] Table read_blank_separated(std::string_view text, std::string path);
+[[nodiscard]] Table read_blank_separated(TextBlocks text, std::string path);
 
 /// The whole field as a finite number, blanks around it allowed; nullopt otherwise.
 [[nodiscard]] std::optional<double> parse_number(std::string_view field);

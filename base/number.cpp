@@ -9,10 +9,16 @@
 
 namespace kphi {
 
+void append_shortest(std::string& text, double value) {
+  std::array<char, 32> digits{};
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
+  text.append(digits.data(), end);
+}
+
 std::string shortest(double value) {
-  std::array<char, 32> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  return std::string(text.data(), end);
+  std::string text;
+  append_shortest(text, value);
+  return text;
 }
 
 std::string yaml_number(double value) {

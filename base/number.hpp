@@ -11,6 +11,7 @@ namespace kphi {
 
 /// Shortest round trip (std::to_chars): 45, 1e-06, nan.
 [[nodiscard]] std::string shortest(double value);
+void append_shortest(std::string& text, double value);
 
 /// As `shortest`, but every YAML 1.1 and 1.2 reader takes it for a float: the mantissa has a '.', the exponent a sign
 /// (45.0, 1.0e-06, 1.0e+300). Throws std::invalid_argument for NaN and infinities.

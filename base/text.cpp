@@ -15,32 +15,61 @@
 
 namespace kphi {
 
-std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes) {
-  const auto fail = [](const char* what, const char* next_move) {
-    throw std::runtime_error(fmt::format("{}: {}; {}", what, std::strerror(errno), next_move));
-  };
-  // O_NONBLOCK: a pipe that nobody writes to must not keep the program waiting before it is refused.
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (file.number() < 0) fail("cannot be opened", "check the name");
+namespace {
+
+constexpr std::size_t kBlock = std::size_t{1} << 20;
+
+[[noreturn]] void fail(const char* what, const char* next_move) {
+  throw std::runtime_error(fmt::format("{}: {}; {}", what, std::strerror(errno), next_move));
+}
+
+}  // namespace
+
+// O_NONBLOCK: a pipe that nobody writes to must not keep the program waiting before it is refused.
+TextFile::TextFile(const std::filesystem::path& path, std::size_t most_bytes)
+    : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)), most_bytes_(most_bytes) {
+  if (file_.number() < 0) fail("cannot be opened", "check the name");
   struct stat about {};
-  if (::fstat(file.number(), &about) != 0) fail("cannot be read", "check the disk");
+  if (::fstat(file_.number(), &about) != 0) fail("cannot be read", "check the disk");
   if (S_ISDIR(about.st_mode)) throw std::runtime_error("is a folder; name a file");
   if (!S_ISREG(about.st_mode)) throw std::runtime_error("is a pipe or a device; name a file");
-  std::string text;
-  for (std::size_t size = 0;;) {
-    if (size == text.size())
-      text.resize(std::min(most_bytes + 1, std::max(2 * size, static_cast<std::size_t>(about.st_size) + 1)));
-    const ssize_t got = ::read(file.number(), text.data() + size, text.size() - size);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail("cannot be read", "check the disk");
-    size += static_cast<std::size_t>(got);
-    if (size > most_bytes)
-      throw std::runtime_error(
-          fmt::format("is larger than {} MiB; check that this is the right file", most_bytes >> 20));
-    if (got > 0) continue;
-    text.resize(size);
-    return text;
+}
+
+std::size_t TextFile::read_more() {
+  const std::size_t size = bytes_.size();
+  bytes_.resize(size + kBlock);
+  ssize_t got = 0;
+  while ((got = ::read(file_.number(), bytes_.data() + size, kBlock)) < 0 && errno == EINTR) {
   }
+  if (got < 0) fail("cannot be read", "check the disk");
+  bytes_.resize(size + static_cast<std::size_t>(got));
+  read_ += static_cast<std::size_t>(got);
+  if (read_ > most_bytes_)
+    throw std::runtime_error(
+        fmt::format("is larger than {} MiB; check that this is the right file", most_bytes_ >> 20));
+  return static_cast<std::size_t>(got);
+}
+
+std::string_view TextFile::next_block() {
+  bytes_.erase(0, given_);
+  std::size_t searched = bytes_.size();
+  while (read_more() > 0) {
+    const std::size_t last = std::string_view(bytes_).substr(searched).rfind('\n');
+    if (last != std::string_view::npos) {
+      given_ = searched + last + 1;
+      return std::string_view(bytes_).substr(0, given_);
+    }
+    searched = bytes_.size();
+  }
+  given_ = bytes_.size();
+  return bytes_;
+}
+
+std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes) {
+  TextFile file(path, most_bytes);
+  std::string text;
+  for (std::string_view block = file.next_block(); !block.empty(); block = file.next_block()) text += block;
+  return text;
 }
 
 std::string printable(std::string_view text, LineEnds line_ends) {

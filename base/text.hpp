@@ -1,16 +1,57 @@
 // Text from outside: files that a person names, read in bounded memory and without waiting; words for a terminal.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
+
+#include "base/descriptor.hpp"
 
 namespace kphi {
 
 /// The file's bytes, `most_bytes` at most. Throws std::runtime_error ("cause; next move", without the file's name) if
 /// the file cannot be opened or read, is longer, or is a folder, a pipe or a device.
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
+
+/// A text in blocks of whole lines, one at hand at a time: the whole of it, or piece by piece where it is too long for
+/// memory.
+class TextBlocks {
+ public:
+  template <std::convertible_to<std::string_view> Text>
+  TextBlocks(const Text& whole) : front_(whole) {}
+  /// `next` gives the next block, which stays valid until it is called again; an empty one at the end.
+  explicit TextBlocks(std::function<std::string_view()> next) : next_(std::move(next)), front_(next_()) {}
+
+  /// The block at hand; empty at the end.
+  [[nodiscard]] std::string_view front() const { return front_; }
+  void pop() { front_ = next_ ? next_() : std::string_view(); }
+
+ private:
+  std::function<std::string_view()> next_;
+  std::string_view front_;
+};
+
+/// A file that is read in blocks of whole lines of about 1 MiB. Refuses as read_text_file does.
+class TextFile {
+ public:
+  TextFile(const std::filesystem::path& path, std::size_t most_bytes);
+  /// Valid until the next call; empty at the end. The last line may lack its line break.
+  [[nodiscard]] std::string_view next_block();
+
+ private:
+  /// Appends what one call of read(2) gives; 0 at the end of the file.
+  std::size_t read_more();
+
+  Descriptor file_;
+  std::size_t most_bytes_;
+  std::size_t read_ = 0;
+  std::string bytes_;      ///< handed out, and the begin of the next line
+  std::size_t given_ = 0;  ///< of them
+};
 
 enum class LineEnds { replace, keep };
 

@@ -7,6 +7,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/propellers/claims.hpp"
@@ -92,7 +93,7 @@ void export_run(const ExportRequest& request) {
 
 void export_coefficients(const ExportRequest& request) {
   const compensation::Coefficients coefficients = load_sealed_coefficients(coefficient_file_of(request.file).string());
-  print_doubts(coefficients.path, coefficients);
+  print_doubts(coefficients.path, compensation::doubts_of(coefficients));
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
     const Export result = target.write(coefficients, request.options);

@@ -7,6 +7,7 @@
 #include "base/csv.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/table_line.hpp"
@@ -243,6 +244,14 @@ ExitCode run_K_T_alone(const FitRequest& request, FitInput& input, const Fitted&
   return ExitCode::ok;
 }
 
+std::vector<std::string> doubts_of(const Identification& identification) {
+  std::vector<double> angles;
+  for (const OcclusionCoefficient& row : identification.table) angles.push_back(row.phi_deg);
+  const auto air = identification.air ? std::optional(identification.air->value) : std::nullopt;
+  return compensation::doubts_of(ThrustCoefficient(identification.curve_fit.K_T), identification.diameter_in, air,
+                                 angles);
+}
+
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
   if (!input.table.empty())
@@ -262,7 +271,7 @@ ExitCode run_fit(const FitRequest& request) {
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);
   print_findings(request, input, fitted, file);
-  print_doubts(file.string(), compensation::parse_coefficients(text, file.string()));
+  print_doubts(file.string(), doubts_of(identification));
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   std::vector<fs::path> written{file};
   if (!request.no_report) {

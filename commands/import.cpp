@@ -79,18 +79,20 @@ struct ImportedLog {
 
 /// Writes the table and says its k.
 ImportedLog import_file(const std::string& path, const ImportRequest& request, const ImportOptions& options) {
-  const std::string text = results::read_text(path, results::kLargestLog);
-  const Import import = import_table(text, path, options);
+  results::HashedText text(path, results::kLargestLog);
+  const Import import = import_table(text.blocks(), path, options);
+  const ImportedTable& table = import.table;
   const std::string name = fs::path(path).stem().string();
   const fs::path folder = fs::path(request.out) / name;
   fs::create_directories(folder);
-  write_output(folder / "steps.csv", results::format_steps(import.table.steps));
-  const std::string record = import_record(import, text, path, options, kVersion);
+  results::write_steps(folder / "steps.csv", {table.size(), [&](std::size_t row) { return table.step(row); }});
+  const ThrustFit fit = fit_thrust(points_of(table));
+  const std::string record = import_record(import, fit, text.sha256(), path, options, kVersion);
   write_output(folder / "import.json", record);
   print_findings(import, path);
-  fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(import.table)));
+  fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(table, fit)));
   const bool spoilt = std::ranges::any_of(import.findings, spoils_k, &LogFinding::kind);
-  return {{name, fit_thrust(points_of(import.table.steps)).parameters.k}, spoilt};
+  return {{name, fit.parameters.k}, spoilt};
 }
 
 void print_outliers(const std::vector<NamedCoefficient>& group) {

@@ -166,14 +166,13 @@ compensation::Coefficients load_sealed_coefficients(const std::string& path) {
   return file;
 }
 
-void print_doubts(const std::string& path, const compensation::Coefficients& coefficients) {
-  for (const std::string& doubt : compensation::doubts_of(coefficients))
-    fmt::print(stderr, "doubtful      {}: {}\n", path, doubt);
+void print_doubts(const std::string& path, const std::vector<std::string>& doubts) {
+  for (const std::string& doubt : doubts) fmt::print(stderr, "doubtful      {}: {}\n", path, doubt);
 }
 
 compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
   const compensation::Coefficients file = load_sealed_coefficients(coefficients);
-  print_doubts(coefficients, file);
+  print_doubts(coefficients, compensation::doubts_of(file));
   const compensation::ThrustCurve curve = file.curve;
   const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
   if (mismatch) throw ConfigurationError(*mismatch);

@@ -48,7 +48,7 @@ void add_flight_files(CLI::App& command, std::string& coefficients, std::string&
 /// As compensation::load_coefficients. Throws DataRejected if the file was changed since it was written.
 [[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path);
 /// Says on stderr, one line each, what of the coefficients is unlike any propeller or stand.
-void print_doubts(const std::string& path, const compensation::Coefficients& coefficients);
+void print_doubts(const std::string& path, const std::vector<std::string>& doubts);
 
 /// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
 [[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,

@@ -27,25 +27,19 @@ Descriptor opened(const std::filesystem::path& path, int flags, const char* oper
   return file;
 }
 
-class Digest {
- public:
-  Digest() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
-    check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
-  }
-  void update(const void* bytes, std::size_t size) { check(EVP_DigestUpdate(context_.get(), bytes, size) == 1); }
-  [[nodiscard]] std::string hex() {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
-    unsigned size = 0;
-    check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
-    return fmt::format("{:02x}", fmt::join(raw.begin(), raw.begin() + size, ""));
-  }
+void check(bool ok) {
+  if (!ok) throw RecordError("OpenSSL: SHA-256 is not available; check the OpenSSL configuration");
+}
 
- private:
-  static void check(bool ok) {
-    if (!ok) throw RecordError("OpenSSL: SHA-256 is not available; check the OpenSSL configuration");
+/// What a text file refuses becomes a RecordError that names it.
+template <class Read>
+auto reading(const std::filesystem::path& path, Read read) {
+  try {
+    return read();
+  } catch (const std::runtime_error& error) {
+    throw RecordError(fmt::format("{}: {}", path.string(), error.what()));
   }
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
-};
+}
 
 }  // namespace
 
@@ -118,24 +112,39 @@ void sync_file(const std::filesystem::path& path, FileLayer& files) {
   files.sync_data(opened(path, O_RDONLY, "open").number());
 }
 
-void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
-  const std::filesystem::path part = path.string() + ".part";
-  on_disk(path.string(), [&] {
-    files.before_write(text.size());
-    const Descriptor fd = opened(part, O_WRONLY | O_CREAT | O_TRUNC, "open");
-    write_all(fd.number(), text);
-    files.sync_data(fd.number());
-    files.replace(part, path);
-    files.sync_folder(path.parent_path());
+ReplacedFile::ReplacedFile(std::filesystem::path path, FileLayer& files)
+    : path_(std::move(path)), part_(path_.string() + ".part"), files_(files) {
+  on_disk(path_.string(), [&] { descriptor_ = opened(part_, O_WRONLY | O_CREAT | O_TRUNC, "open"); });
+}
+
+ReplacedFile::~ReplacedFile() {
+  if (!finished_) ::unlink(part_.c_str());
+}
+
+void ReplacedFile::append(std::string_view text) {
+  on_disk(path_.string(), [&] {
+    files_.before_write(text.size());
+    write_all(descriptor_.number(), text);
   });
 }
 
+void ReplacedFile::finish() {
+  on_disk(path_.string(), [&] {
+    files_.sync_data(descriptor_.number());
+    files_.replace(part_, path_);
+    finished_ = true;
+    files_.sync_folder(path_.parent_path());
+  });
+}
+
+void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files) {
+  ReplacedFile file(path, files);
+  file.append(text);
+  file.finish();
+}
+
 std::string read_text(const std::filesystem::path& path, std::size_t most_bytes) {
-  try {
-    return read_text_file(path, most_bytes);
-  } catch (const std::runtime_error& error) {
-    throw RecordError(fmt::format("{}: {}", path.string(), error.what()));
-  }
+  return reading(path, [&] { return read_text_file(path, most_bytes); });
 }
 
 std::string failure_text(const std::string& where, int error) {
@@ -144,20 +153,46 @@ std::string failure_text(const std::string& where, int error) {
                      full ? "; make room or choose another folder" : "");
 }
 
+Sha256::Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
+}
+
+void Sha256::update(std::string_view bytes) {
+  check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256::hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
+  unsigned size = 0;
+  check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
+  return fmt::format("{:02x}", fmt::join(raw.begin(), raw.begin() + size, ""));
+}
+
 std::string sha256(std::string_view bytes) {
-  Digest digest;
-  digest.update(bytes.data(), bytes.size());
+  Sha256 digest;
+  digest.update(bytes);
   return digest.hex();
 }
 
 std::string sha256_of_file(const std::filesystem::path& path) {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
   if (!file) throw RecordError(failure_text(path.string(), errno));
-  Digest digest;
+  Sha256 digest;
   std::vector<char> block(1 << 18);
-  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update(block.data(), n);
+  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update({block.data(), n});
   if (std::ferror(file.get())) throw RecordError(failure_text(path.string(), errno));
   return digest.hex();
+}
+
+HashedText::HashedText(const std::filesystem::path& path, std::size_t most_bytes)
+    : path_(path), file_(reading(path, [&] { return TextFile(path, most_bytes); })) {}
+
+TextBlocks HashedText::blocks() {
+  return TextBlocks([this] {
+    const std::string_view block = reading(path_, [this] { return file_.next_block(); });
+    digest_.update(block);
+    return block;
+  });
 }
 
 }  // namespace kphi::results

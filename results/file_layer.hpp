@@ -4,11 +4,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <system_error>
 
+#include "base/descriptor.hpp"
 #include "base/error.hpp"
+#include "base/text.hpp"
+
+struct evp_md_ctx_st;
 
 namespace kphi::results {
 
@@ -67,7 +72,25 @@ void write_all(int descriptor, std::string_view text);
 /// Syncs a closed file. Throws std::system_error.
 void sync_file(const std::filesystem::path& path, FileLayer& files);
 
-/// Writes `text` to `path`.part, syncs it, replaces `path` by it and syncs the folder. Throws RecordError.
+/// A file written piece by piece to `path`.part, which replaces `path` when it is complete and synced. Not finished, it
+/// goes, and `path` is as it was. Throws RecordError.
+class ReplacedFile {
+ public:
+  explicit ReplacedFile(std::filesystem::path path, FileLayer& files = disk());
+  ReplacedFile(const ReplacedFile&) = delete;
+  ReplacedFile& operator=(const ReplacedFile&) = delete;
+  ~ReplacedFile();
+  void append(std::string_view text);
+  void finish();
+
+ private:
+  std::filesystem::path path_, part_;
+  FileLayer& files_;
+  Descriptor descriptor_;
+  bool finished_ = false;
+};
+
+/// All of a ReplacedFile at once.
 void write_text(const std::filesystem::path& path, const std::string& text, FileLayer& files = disk());
 
 /// Of a table or a journal that kphi writes; of a log that is imported.
@@ -76,9 +99,34 @@ inline constexpr std::size_t kLargestTable = std::size_t{64} << 20, kLargestLog 
 /// The file's bytes, `most_bytes` at most. Throws RecordError for a longer file, a pipe, a device or a folder.
 [[nodiscard]] std::string read_text(const std::filesystem::path& path, std::size_t most_bytes = kLargestTable);
 
-/// 64 lower-case hex digits.
+class Sha256 {
+ public:
+  Sha256();
+  void update(std::string_view bytes);
+  /// 64 lower-case hex digits; the last call.
+  [[nodiscard]] std::string hex();
+
+ private:
+  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;
+};
+
 [[nodiscard]] std::string sha256(std::string_view bytes);
 /// Throws RecordError if the file cannot be read to its end.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
+
+/// A long text, read once, in blocks of whole lines. Throws RecordError as read_text does.
+class HashedText {
+ public:
+  HashedText(const std::filesystem::path& path, std::size_t most_bytes);
+  /// Once; `this` must outlive it.
+  [[nodiscard]] TextBlocks blocks();
+  /// Of the blocks handed out; the last call.
+  [[nodiscard]] std::string sha256() { return digest_.hex(); }
+
+ private:
+  std::filesystem::path path_;
+  TextFile file_;
+  Sha256 digest_;
+};
 
 }  // namespace kphi::results

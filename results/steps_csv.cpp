@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
+#include <future>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <variant>
 
@@ -60,17 +63,23 @@ const std::array kColumns{
 
 using Columns = std::vector<StepColumn>;
 
-Columns columns_of(std::span<const StepMean> steps) {
-  Columns columns;
+/// For each group whether one of the steps has a value for its first column.
+using Groups = std::array<bool, 5>;
+constexpr Groups kNoGroups{true};  // but the one of the columns that all have
+
+void take_groups(const StepMean& step, Groups& groups) {
   int group = 0;
-  bool present = true;
   for (const StepColumn& column : kColumns) {
-    if (column.group != std::exchange(group, column.group)) {
-      const auto first = std::get<double StepMean::*>(column.field);
-      present = std::ranges::any_of(steps, [&](const StepMean& s) { return !std::isnan(s.*first); });
-    }
-    if (present) columns.push_back(column);
+    if (column.group == group) continue;
+    group = column.group;
+    groups[static_cast<std::size_t>(group)] |= !std::isnan(step.*std::get<double StepMean::*>(column.field));
   }
+}
+
+Columns columns_of(const Groups& groups) {
+  Columns columns;
+  for (const StepColumn& column : kColumns)
+    if (groups[static_cast<std::size_t>(column.group)]) columns.push_back(column);
   return columns;
 }
 
@@ -127,19 +136,25 @@ std::string joined(std::uint32_t flags, std::string_view FlagText::*text, const 
   return all;
 }
 
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\" \t") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + '"';
+void append_quoted(std::string& line, const std::string& text) {
+  if (text.find_first_of(",\" \t") == std::string::npos) {
+    line += text;
+    return;
+  }
+  line += '"';
+  for (const char c : text) line.append(c == '"' ? 2 : 1, c);
+  line += '"';
 }
 
-struct Format {
+struct Append {
   const StepMean& step;
-  std::string operator()(std::string StepMean::*m) const { return quoted(step.*m); }
-  std::string operator()(auto StepMean::*m) const { return std::to_string(step.*m); }
-  std::string operator()(double StepMean::*m) const { return std::isnan(step.*m) ? std::string() : shortest(step.*m); }
-  std::string operator()(std::uint32_t StepMean::*m) const { return quality_flag_names(step.*m); }
+  std::string& line;
+  void operator()(std::string StepMean::*m) const { append_quoted(line, step.*m); }
+  void operator()(auto StepMean::*m) const { fmt::format_to(std::back_inserter(line), "{}", step.*m); }
+  void operator()(double StepMean::*m) const {
+    if (!std::isnan(step.*m)) append_shortest(line, step.*m);
+  }
+  void operator()(std::uint32_t StepMean::*m) const { line += quality_flag_names(step.*m); }
 };
 
 template <class Value>
@@ -162,13 +177,37 @@ struct Parse {
   void operator()(std::uint32_t StepMean::*m) const { step.*m = quality_flags_from_names(text); }
 };
 
-std::string row_of(const StepMean& step, const Columns& columns) {
-  std::string line;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (i > 0) line += ',';
-    line += std::visit(Format{step}, columns[i].field);
+void append_row(std::string& text, const StepMean& step, const Columns& columns) {
+  for (const StepColumn& column : columns) {
+    std::visit(Append{step, text}, column.field);
+    text += ',';
   }
-  return line;
+  text.back() = '\n';
+}
+
+/// Hands the file over in pieces, which a thread per processor writes.
+void format_to(const StepSource& steps, const std::function<void(std::string_view)>& sink) {
+  constexpr std::size_t kRows = 4096;
+  Groups groups = kNoGroups;
+  for (std::size_t i = 0; i < steps.count; ++i) take_groups(steps.step(i), groups);
+  const Columns columns = columns_of(groups);
+  const auto piece = [&](std::size_t begin) {
+    std::string text;
+    for (std::size_t i = begin; i < std::min(begin + kRows, steps.count); ++i) append_row(text, steps.step(i), columns);
+    return text;
+  };
+  std::deque<std::future<std::string>> ahead;
+  const auto hand_over = [&] {
+    sink(ahead.front().get());
+    ahead.pop_front();
+  };
+  sink(header_of(columns) + '\n');
+  const auto policy = steps.count > kRows ? std::launch::async : std::launch::deferred;
+  for (std::size_t begin = 0; begin < steps.count; begin += kRows) {
+    if (ahead.size() >= std::max(1u, std::thread::hardware_concurrency())) hand_over();
+    ahead.push_back(std::async(policy, piece, begin));
+  }
+  while (!ahead.empty()) hand_over();
 }
 
 /// The columns that a header names, in its order. All but those of the groups must be there, none twice.
@@ -180,10 +219,10 @@ Columns columns_named(const std::vector<std::string>& names) {
     if (std::ranges::count(names, name) > 1) throw std::invalid_argument(fmt::format("column {} occurs twice", name));
     columns.push_back(*found);
   }
-  for (const StepColumn& required : columns_of({})) {
+  for (const StepColumn& required : columns_of(kNoGroups)) {
     if (std::ranges::find(names, required.name) == names.end())
       throw std::invalid_argument(
-          fmt::format("column {} is missing; expected {}", required.name, header_of(columns_of({}))));
+          fmt::format("column {} is missing; expected {}", required.name, header_of(columns_of(kNoGroups))));
   }
   return columns;
 }
@@ -219,9 +258,8 @@ std::uint32_t quality_flags_from_names(std::string_view names) {
 }
 
 std::string format_steps(std::span<const StepMean> steps) {
-  const Columns columns = columns_of(steps);
-  std::string text = header_of(columns) + '\n';
-  for (const StepMean& step : steps) text += row_of(step, columns) + '\n';
+  std::string text;
+  format_to({steps.size(), [&](std::size_t i) { return steps[i]; }}, [&](std::string_view piece) { text += piece; });
   return text;
 }
 
@@ -252,6 +290,12 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
 
 void write_steps(const std::filesystem::path& path, std::span<const StepMean> steps, FileLayer& files) {
   write_text(path, format_steps(steps), files);
+}
+
+void write_steps(const std::filesystem::path& path, const StepSource& steps, FileLayer& files) {
+  ReplacedFile file(path, files);
+  format_to(steps, [&](std::string_view piece) { file.append(piece); });
+  file.finish();
 }
 
 std::vector<StepMean> read_steps(const std::filesystem::path& path) {

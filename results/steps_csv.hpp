@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -25,12 +26,20 @@ namespace kphi::results {
 /// The whole file: the same bytes live and in replay.
 [[nodiscard]] std::string format_steps(std::span<const StepMean> steps);
 
+/// Steps made one by one, where all at once are too many for memory; each is asked for twice, from any
+/// thread.
+struct StepSource {
+  std::size_t count = 0;
+  std::function<StepMean(std::size_t)> step;
+};
+
 /// Columns by name, in any order; optional ones may be missing. Throws ConfigurationError "name:line: …" for an
 /// unknown, missing or repeated column and for an invalid field.
 [[nodiscard]] std::vector<StepMean> parse_steps(std::string_view text, const std::string& name);
 
 /// Replaces `path` atomically. Throws RecordError.
 void write_steps(const std::filesystem::path& path, std::span<const StepMean> steps, FileLayer& files = disk());
+void write_steps(const std::filesystem::path& path, const StepSource& steps, FileLayer& files = disk());
 /// Throws RecordError for an unreadable file, ConfigurationError for an invalid one.
 [[nodiscard]] std::vector<StepMean> read_steps(const std::filesystem::path& path);
 

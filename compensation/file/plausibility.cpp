@@ -40,15 +40,19 @@ std::optional<std::string> doubt_of_angles(const std::vector<double>& angles_deg
   return words;
 }
 
+std::vector<std::string> doubts_of(ThrustCoefficient k_t, double diameter_in, std::optional<double> air_density_kg_m3,
+                                   const std::vector<double>& angles_deg) {
+  std::vector<std::string> doubts;
+  for (const auto& doubt : {doubt_of_thrust(k_t, diameter_in, air_density_kg_m3), doubt_of_angles(angles_deg)})
+    if (doubt) doubts.push_back(*doubt);
+  return doubts;
+}
+
 std::vector<std::string> doubts_of(const Coefficients& coefficients) {
   std::vector<double> angles;
   for (const auto& row : coefficients.table) angles.push_back(to_degrees(row.occlusion));
-  std::vector<std::string> doubts;
-  for (const auto& doubt : {doubt_of_thrust(coefficients.curve.thrust_coefficient(), coefficients.propeller.diameter_in,
-                                            coefficients.air_density_kg_m3),
-                            doubt_of_angles(angles)})
-    if (doubt) doubts.push_back(*doubt);
-  return doubts;
+  return doubts_of(coefficients.curve.thrust_coefficient(), coefficients.propeller.diameter_in,
+                   coefficients.air_density_kg_m3, angles);
 }
 
 }  // namespace kphi::compensation

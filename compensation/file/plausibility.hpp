@@ -20,6 +20,9 @@ inline constexpr double kLeastCt = 0.02, kLargestCt = 0.4;
 /// Occlusions in degrees that look like radians: none above 2π, and not whole.
 [[nodiscard]] std::optional<std::string> doubt_of_angles(const std::vector<double>& angles_deg);
 
+[[nodiscard]] std::vector<std::string> doubts_of(ThrustCoefficient k_t, double diameter_in,
+                                                 std::optional<double> air_density_kg_m3,
+                                                 const std::vector<double>& angles_deg);
 [[nodiscard]] std::vector<std::string> doubts_of(const Coefficients& coefficients);
 
 }  // namespace kphi::compensation

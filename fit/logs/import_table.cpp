@@ -13,7 +13,6 @@
 #include "compensation/units.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/thrust_fit.hpp"
-#include "results/file_layer.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -61,20 +60,20 @@ bool is_uiuc(std::string_view text) {
   return header.find_column("RPM") && header.find_column("CT");
 }
 
-Import import_log(const StandLog& log, const RowSelection& selection) {
+Import import_log(StandLog log, const RowSelection& selection) {
   Import import;
   import.findings = audit(log, selection);
   for (const LogFinding& finding : import.findings) {
     if (finding.kind == FindingKind::speed_ratio && !selection.speed)
       throw FitError(fmt::format("{}: {}", log.path, finding.text));
   }
-  import.table = select_rows(log, selection);
+  import.table = select_rows(std::move(log), selection);
   flag_steps(import.table, import.findings);
   return import;
 }
 
-Import import_uiuc(std::string_view text, const std::string& path, const ImportOptions& options) {
-  Import import{read_uiuc(text, path, options.diameter_in, options.air_density_kg_m3), {}};
+Import import_uiuc(TextBlocks text, const std::string& path, const ImportOptions& options) {
+  Import import{read_uiuc(std::move(text), path, options.diameter_in, options.air_density_kg_m3), {}};
   for (const TableProblem& problem : import.table.problems)
     import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, { problem.line }});
   return import;
@@ -93,9 +92,8 @@ std::optional<double> diameter_from_name(std::string_view file_name) {
   return std::nullopt;
 }
 
-ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<double> diameter_in,
-                        double density_kg_m3) {
-  const Table table = read_blank_separated(text, std::move(path));
+ImportedTable read_uiuc(TextBlocks text, std::string path, std::optional<double> diameter_in, double density_kg_m3) {
+  const Table table = read_blank_separated(std::move(text), std::move(path));
   const std::size_t rpm_column = table.column("RPM"), ct_column = table.column("CT");
   const std::filesystem::path file(table.path);
   if (!diameter_in) diameter_in = diameter_from_name(file.filename().string());
@@ -104,6 +102,8 @@ ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<d
   ImportedTable imported;
   imported.unit = fmt::format("CT, rho {} kg/m3, D {} in", density_kg_m3, *diameter_in);
   imported.speed_source = "table";
+  imported.propeller = file.stem().string();
+  imported.diameter_in = *diameter_in;
   imported.rows_total = table.rows.size() + table.problems.size();
   imported.problems = table.problems;
   for (const TableRow& row : table.rows) {
@@ -113,15 +113,13 @@ ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<d
       continue;
     }
     const double turns_per_s = *rpm / 60, diameter = *diameter_in * kMetresPerInch;
-    results::StepMean step = step_of_row(*rpm, *ct * density_kg_m3 * turns_per_s * turns_per_s * std::pow(diameter, 4));
-    step.propeller = file.stem().string();
-    step.diameter_in = *diameter_in;
-    step.step = static_cast<int>(imported.steps.size());
-    imported.steps.push_back(std::move(step));
-    imported.lines.push_back(row.line);
+    imported.rows.push_back({.line = row.line,
+                             .optical_rpm = *rpm,
+                             .thrust_n = *ct * density_kg_m3 * turns_per_s * turns_per_s * std::pow(diameter, 4)});
   }
-  if (imported.steps.empty()) throw ConfigurationError(fmt::format("{}:1: no row with a speed above 0", table.path));
-  refuse_reversed_thrust(imported.steps, table.path);
+  if (imported.rows.empty()) throw ConfigurationError(fmt::format("{}:1: no row with a speed above 0", table.path));
+  imported.quality_flags.resize(imported.size());
+  refuse_reversed_thrust(imported, table.path);
   return imported;
 }
 
@@ -148,32 +146,30 @@ std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, st
   return points;
 }
 
-Import import_table(std::string_view text, const std::string& path, const ImportOptions& options) {
-  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF"))
+Import import_table(TextBlocks text, const std::string& path, const ImportOptions& options) {
+  const std::string_view begin = text.front();
+  if (begin.starts_with("\xFF\xFE") || begin.starts_with("\xFE\xFF"))
     throw ConfigurationError(path + ":1: UTF-16; convert it first: iconv -f UTF-16 -t UTF-8 LOG.csv > NEW.csv");
   Import import = !options.columns.empty()
-                      ? import_log(read_columns(text, path, options.columns, options.dialect), options.rows)
-                  : is_uiuc(text) ? import_uiuc(text, path, options)
-                                  : import_log(read_rcbenchmark(text, path, options.dialect), options.rows);
-  for (results::StepMean& step : import.table.steps) {
-    if (!options.propeller.empty()) step.propeller = options.propeller;
-    if (options.diameter_in) step.diameter_in = *options.diameter_in;
-    step.blades = options.blades;
-  }
+                      ? import_log(read_columns(std::move(text), path, options.columns, options.dialect), options.rows)
+                  : is_uiuc(begin) ? import_uiuc(std::move(text), path, options)
+                                   : import_log(read_rcbenchmark(std::move(text), path, options.dialect), options.rows);
+  if (!options.propeller.empty()) import.table.propeller = options.propeller;
+  if (options.diameter_in) import.table.diameter_in = *options.diameter_in;
+  import.table.blades = options.blades;
   return import;
 }
 
-std::string summary_of(const ImportedTable& imported) {
-  const ThrustFit fit = fit_thrust(points_of(imported.steps));
-  std::string text = fmt::format("{} of {} rows, thrust in {}, {} speed", imported.steps.size(), imported.rows_total,
+std::string summary_of(const ImportedTable& imported, const ThrustFit& fit) {
+  std::string text = fmt::format("{} of {} rows, thrust in {}, {} speed", imported.size(), imported.rows_total,
                                  imported.unit, imported.speed_source);
   if (imported.tare_n != 0) text += fmt::format(", tare {:.4f} N", imported.tare_n);
   return text + fmt::format(", k = {} N/(rad/s)^2, rms {:.4f} N", with_error(fit.parameters.k, fit.standard_error.k),
                             fit.rms_n);
 }
 
-std::string import_record(const Import& import, std::string_view text, const std::string& path,
-                          const ImportOptions& options, const std::string& tool_version) {
+std::string import_record(const Import& import, const ThrustFit& fit, const std::string& sha256,
+                          const std::string& path, const ImportOptions& options, const std::string& tool_version) {
   Json findings = Json::array();
   for (const LogFinding& finding : import.findings) {
     Json& one = findings.emplace_back(Json{{"kind", name_of(finding.kind)}});
@@ -182,13 +178,12 @@ std::string import_record(const Import& import, std::string_view text, const std
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)
     problems.push_back({{"line", problem.line}, {"what", problem.what}});
-  const ThrustFit fit = fit_thrust(points_of(import.table.steps));
   Json record{{"format", "kphi-import/1"},
               {"source", path},
-              {"sha256", results::sha256(text)},
+              {"sha256", sha256},
               {"tool_version", tool_version},
               {"thrust_unit", import.table.unit},
-              {"rows_used", import.table.steps.size()},
+              {"rows_used", import.table.size()},
               {"k_n_s2_per_rad2", fit.parameters.k},
               {"k_standard_error_n_s2_per_rad2", fit.standard_error.k},
               {"rms_n", fit.rms_n},

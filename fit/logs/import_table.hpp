@@ -22,7 +22,7 @@ inline constexpr double kUiucDensityKgM3 = 1.225;
 
 /// T = CT ρ n² D⁴, n in 1/s, D in m, by default the nominal one from the file's name ("apcsf_10x7_static_…" is 10
 /// inch). Throws ConfigurationError (path:line) when a column is missing, no row is left, or the diameter is unknown.
-[[nodiscard]] ImportedTable read_uiuc(std::string_view text, std::string path, std::optional<double> diameter_in = {},
+[[nodiscard]] ImportedTable read_uiuc(TextBlocks text, std::string path, std::optional<double> diameter_in = {},
                                       double density_kg_m3 = kUiucDensityKgM3);
 
 /// Whether the header has phi_deg and one of the columns of k.
@@ -52,14 +52,14 @@ struct Import {
 
 /// As the columns say, or UIUC when the header's columns are RPM and CT, else RCbenchmark. Two speeds at a ratio other
 /// than 1 need a decision: without `rows.speed` such a table throws FitError. Throws ConfigurationError (path:line).
-[[nodiscard]] Import import_table(std::string_view text, const std::string& path, const ImportOptions& options);
+[[nodiscard]] Import import_table(TextBlocks text, const std::string& path, const ImportOptions& options);
 
-/// "10 of 11 rows, thrust in gf, electrical speed, k = 1.1107e-06 ± 1.0e-08 N/(rad/s)^2, rms 0.0453 N". Throws
-/// FitError.
-[[nodiscard]] std::string summary_of(const ImportedTable& imported);
+/// "10 of 11 rows, thrust in gf, electrical speed, k = 1.1107e-06 ± 1.0e-08 N/(rad/s)^2, rms 0.0453 N"
+[[nodiscard]] std::string summary_of(const ImportedTable& imported, const ThrustFit& fit);
 
 /// import.json: the source with its hash, what was asked, what was taken, and every finding.
-[[nodiscard]] std::string import_record(const Import& import, std::string_view text, const std::string& path,
-                                        const ImportOptions& options, const std::string& tool_version);
+[[nodiscard]] std::string import_record(const Import& import, const ThrustFit& fit, const std::string& sha256,
+                                        const std::string& path, const ImportOptions& options,
+                                        const std::string& tool_version);
 
 }  // namespace kphi::fit

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <set>
 
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
@@ -385,10 +384,12 @@ std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection
 
 void flag_steps(ImportedTable& table, const std::vector<LogFinding>& findings) {
   for (const LogFinding& finding : findings) {
-    const std::set<std::size_t> lines(finding.lines.begin(), finding.lines.end());
-    for (std::size_t i = 0; i < table.steps.size(); ++i)
-      if (lines.contains(table.lines[i]))
-        table.steps[i].quality_flags |= static_cast<std::uint32_t>(flag_of(finding.kind));
+    const auto flag = static_cast<std::uint32_t>(flag_of(finding.kind));
+    if (flag == 0) continue;
+    std::vector<std::size_t> lines = finding.lines;
+    std::ranges::sort(lines);
+    for (std::size_t i = 0; i < table.size(); ++i)
+      if (std::ranges::binary_search(lines, table.rows[i].line)) table.quality_flags[i] |= flag;
   }
 }
 

@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <filesystem>
+#include <future>
+#include <thread>
 
 #include "base/error.hpp"
 #include "base/statistics.hpp"
@@ -26,6 +29,7 @@ struct UnitRow {
 constexpr double kPoundForce = 4.4482216152605;  // N, exactly (0.45359237 kg × 9.80665 m/s²)
 constexpr double kInch = 0.0254;                 // m, exactly
 constexpr double kGramForce = from_gram_force(1).value();
+constexpr std::size_t kWorthAThread = std::size_t{1} << 16;  // bytes of a block
 
 constexpr std::array kUnits{
     UnitRow{Measure::time, 1, {"s"}},
@@ -193,51 +197,123 @@ std::string objection(Role role, double value) {
   return {};
 }
 
-/// "12,5"
-bool has_decimal_comma(const std::string& field) {
-  std::string point = field;
-  std::replace(point.begin(), point.end(), ',', '.');
-  return point != field && parse_number(point).has_value();
+/// "12,5" → "12.5"
+std::string with_point(std::string field) {
+  std::replace(field.begin(), field.end(), ',', '.');
+  return field;
 }
 
-/// nullopt, and the reason in the log, if the thrust is not a number or a value is impossible.
-std::optional<StandRow> read_row(const TableRow& fields, const Columns& columns, bool decimal_comma, StandLog& log) {
+/// Why a field is no number.
+std::string no_number(const Column& column, const std::string& field) {
+  const char* role = row_of(column.role).name;
+  return field.empty() ? fmt::format("{} is missing", role) : fmt::format("{} \"{}\" is not a number", role, field);
+}
+
+/// The field as a number; nullopt if it is none. Throws ConfigurationError where a decimal comma would make it one.
+std::optional<double> number_in(const TableRow& fields, std::size_t column, bool decimal_comma,
+                                const std::string& path) {
+  const std::string& field = fields.fields[column];
+  if (decimal_comma) return parse_number(with_point(field));
+  const auto value = parse_number(field);
+  if (value || field.find(',') == std::string::npos || !parse_number(with_point(field))) return value;
+  throw ConfigurationError(
+      fmt::format("{}:{}: \"{}\" has a decimal comma; import with --decimal-comma", path, fields.line, field));
+}
+
+/// What one block of a log gives.
+struct LogBlock {
+  std::vector<StandRow> rows;
+  std::vector<TableProblem> problems, not_numbers;
+};
+
+/// How the rows of a table are read.
+struct RowFormat {
+  Columns columns;
+  char separator = ',';
+  bool decimal_comma = false;
+};
+
+/// nullopt, and the reason in the block, if the thrust is not a number or a value is impossible.
+std::optional<StandRow> read_row(const TableRow& fields, const RowFormat& format, const std::string& path,
+                                 LogBlock& block) {
   StandRow row{.line = fields.line};
-  for (const Column& column : columns) {
-    std::string field = fields.fields[column.index];
-    if (decimal_comma) std::replace(field.begin(), field.end(), ',', '.');
-    auto value = parse_number(field);
-    if (!value && !decimal_comma && has_decimal_comma(field))
-      throw ConfigurationError(
-          fmt::format("{}:{}: \"{}\" has a decimal comma; import with --decimal-comma", log.path, fields.line, field));
-    if (value && !std::isfinite(*value)) value.reset();
-    const bool needed = column.role == kThrust || column.role == &StandRow::occlusion_deg;
-    const std::string no_number = field.empty()
-                                      ? fmt::format("{} is missing", row_of(column.role).name)
-                                      : fmt::format("{} \"{}\" is not a number", row_of(column.role).name, field);
-    if (!value && !needed) {
-      if (!field.empty()) log.not_numbers.push_back({fields.line, no_number});
+  for (const Column& column : format.columns) {
+    const auto value = number_in(fields, column.index, format.decimal_comma, path);
+    const std::string& field = fields.fields[column.index];
+    if (!value && column.role != kThrust && column.role != &StandRow::occlusion_deg) {
+      if (!field.empty()) block.not_numbers.push_back({fields.line, no_number(column, field)});
       continue;
     }
-    const std::string why = value ? objection(column.role, *value * column.factor) : no_number;
+    const std::string why = value ? objection(column.role, *value * column.factor) : no_number(column, field);
     if (!why.empty()) {
-      log.problems.push_back({fields.line, why + "; line skipped"});
+      block.problems.push_back({fields.line, why + "; line skipped"});
       return std::nullopt;
     }
-    (column.role == kThrust ? row.thrust_n : (row.*column.role).emplace()) = *value * column.factor;
+    if (column.role == kThrust)
+      row.thrust_n = *value * column.factor;
+    else
+      row.*column.role = *value * column.factor;
   }
   return row;
 }
 
-StandLog read_rows(const Table& table, const Columns& columns, bool decimal_comma, std::vector<std::string> unread) {
-  StandLog log{.path = table.path,
-               .thrust_unit = find(columns, kThrust)->unit,
-               .has_electrical = find(columns, &StandRow::electrical_rpm) != nullptr,
-               .has_optical = find(columns, &StandRow::optical_rpm) != nullptr,
-               .problems = table.problems,
-               .unread = std::move(unread)};
-  for (const TableRow& fields : table.rows)
-    if (const auto row = read_row(fields, columns, decimal_comma, log)) log.rows.push_back(*row);
+void append(StandLog& log, LogBlock block) {
+  const auto move_to = [](auto& to, auto& from) { std::ranges::move(from, std::back_inserter(to)); };
+  move_to(log.rows, block.rows);
+  move_to(log.problems, block.problems);
+  move_to(log.not_numbers, block.not_numbers);
+}
+
+LogBlock read_block(const Table& begin, std::string_view text, std::size_t line, const RowFormat& format) {
+  LogBlock block;
+  Table table = read_csv_rows(begin, text, line, format.separator, [&](const Table&, const TableRow& fields) {
+    if (const auto row = read_row(fields, format, begin.path, block)) block.rows.push_back(*row);
+  });
+  block.problems.insert(block.problems.begin(), table.problems.begin(), table.problems.end());
+  std::ranges::stable_sort(block.problems, {}, &TableProblem::line);
+  return block;
+}
+
+/// The lines up to the header, the first that is not blank.
+std::string_view head_of(std::string_view text) {
+  std::size_t end = 0;
+  for (bool blank = true; blank && end < text.size();) {
+    const std::size_t begin = end;
+    end = std::min(text.find('\n', begin), text.size() - 1) + 1;
+    blank = text.substr(begin, end - begin).find_first_not_of(" \t\r\n\xEF\xBB\xBF") == std::string_view::npos;
+  }
+  return text.substr(0, end);
+}
+
+/// `map` finds the columns when the header is known. A thread per processor reads blocks.
+template <class MapColumns>
+StandLog read_rows(TextBlocks text, std::string path, const CsvDialect& dialect, const MapColumns& map) {
+  const std::string_view head = head_of(text.front());
+  RowFormat format{{}, dialect.separator, dialect.decimal_comma};
+  if (format.separator == 0) format.separator = likely_separator(head);
+  const Table begin = read_csv(head, std::move(path), format.separator);
+  format.columns = map(begin);
+  StandLog log{.path = begin.path,
+               .thrust_unit = find(format.columns, kThrust)->unit,
+               .has_electrical = find(format.columns, &StandRow::electrical_rpm) != nullptr,
+               .has_optical = find(format.columns, &StandRow::optical_rpm) != nullptr};
+  std::deque<std::future<LogBlock>> ahead;
+  const auto take = [&] {
+    append(log, ahead.front().get());
+    ahead.pop_front();
+  };
+  std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(head, '\n'));
+  std::string_view block = text.front().substr(head.size());
+  do {
+    if (ahead.size() >= std::max(1u, std::thread::hardware_concurrency())) take();
+    ahead.push_back(std::async(
+        block.size() < kWorthAThread ? std::launch::deferred : std::launch::async,
+        [&begin, &format, line, text = std::string(block)] { return read_block(begin, text, line, format); }));
+    line += static_cast<std::size_t>(std::ranges::count(block, '\n'));
+    text.pop();
+    block = text.front();
+  } while (!block.empty());
+  while (!ahead.empty()) take();
   return log;
 }
 
@@ -288,19 +364,6 @@ void refuse_blind_speed(const StandLog& log, SpeedSource source) {
                      !other                              ? "measure again with one that does"
                      : source == SpeedSource::electrical ? "take the other with --speed optical"
                                                          : "take the other with --speed electrical"));
-}
-
-results::StepMean step_of(const StandRow& row, const RowSelection& selection, SpeedSource source, double tare_n) {
-  const double sign = selection.reverse_thrust ? -1 : 1;
-  results::StepMean step = step_of_row(*rpm_of(row, source) * selection.speed_factor, sign * (row.thrust_n - tare_n));
-  step.occlusion_deg = row.occlusion_deg.value_or(0);
-  step.repetition = static_cast<int>(row.repetition.value_or(1));
-  step.torque_nm = row.torque_nm.value_or(kNotMeasured);
-  step.zero_n = sign * tare_n;
-  step.supply_voltage_v = row.voltage_v.value_or(kNotMeasured);
-  step.supply_current_a = row.current_a.value_or(kNotMeasured);
-  step.window_begin_s = step.window_end_s = row.time_s.value_or(0);
-  return step;
 }
 
 }  // namespace
@@ -362,46 +425,76 @@ ColumnRole parse_column_role(std::string_view text) {
                                        text, fmt::join(names, ", ")));
 }
 
-StandLog read_columns(std::string_view text, std::string path, const std::vector<ColumnRole>& columns,
+StandLog read_columns(TextBlocks text, std::string path, const std::vector<ColumnRole>& columns,
                       const CsvDialect& dialect) {
-  const Table table = read_csv(text, std::move(path), dialect.separator);
-  Columns mapped;
-  for (const ColumnRole& column : columns) {
-    if (find(mapped, column.role) != nullptr)
-      refuse(table, fmt::format("--column names {} twice", row_of(column.role).name));
-    mapped.push_back(map_column(table, column));
-  }
-  if (find(mapped, kThrust) == nullptr || !has_speed(mapped))
-    refuse(table, "a thrust and a speed are needed: --column thrust=HEADER --column speed=HEADER");
-  return read_rows(table, mapped, dialect.decimal_comma, {});
+  return read_rows(std::move(text), std::move(path), dialect, [&](const Table& table) {
+    Columns mapped;
+    for (const ColumnRole& column : columns) {
+      if (find(mapped, column.role) != nullptr)
+        refuse(table, fmt::format("--column names {} twice", row_of(column.role).name));
+      mapped.push_back(map_column(table, column));
+    }
+    if (find(mapped, kThrust) == nullptr || !has_speed(mapped))
+      refuse(table, "a thrust and a speed are needed: --column thrust=HEADER --column speed=HEADER");
+    return mapped;
+  });
 }
 
-StandLog read_rcbenchmark(std::string_view text, std::string path, const CsvDialect& dialect) {
-  const Table table = read_csv(text, std::move(path), dialect.separator);
-  Columns columns;
+StandLog read_rcbenchmark(TextBlocks text, std::string path, const CsvDialect& dialect) {
   std::vector<std::string> unread;
-  for (const KnownChannel& channel : kRcbenchmark) map_channel(table, channel, columns, unread);
-  if (find(columns, kThrust) == nullptr) {
-    refuse(table,
-           "no column \"Thrust (unit)\", so this is not an RCbenchmark table; name the columns of another table "
-           "with --column");
-  }
-  if (!has_speed(columns)) refuse(table, "no column \"Motor Electrical Speed (RPM)\" or \"Motor Optical Speed (RPM)\"");
-  return read_rows(table, columns, dialect.decimal_comma, std::move(unread));
+  StandLog log = read_rows(std::move(text), std::move(path), dialect, [&](const Table& table) {
+    Columns columns;
+    for (const KnownChannel& channel : kRcbenchmark) map_channel(table, channel, columns, unread);
+    if (find(columns, kThrust) == nullptr) {
+      refuse(table,
+             "no column \"Thrust (unit)\", so this is not an RCbenchmark table; name the columns of another table "
+             "with --column");
+    }
+    if (!has_speed(columns))
+      refuse(table, "no column \"Motor Electrical Speed (RPM)\" or \"Motor Optical Speed (RPM)\"");
+    return columns;
+  });
+  log.unread = std::move(unread);
+  return log;
 }
 
-results::StepMean step_of_row(double speed_rpm, double thrust_n) {
+double ImportedTable::speed_rad_s(std::size_t row) const {
+  return from_rpm(*(rows[row].*speed) * speed_factor).value();
+}
+
+double ImportedTable::thrust_n(std::size_t row) const {
+  const double thrust = rows[row].thrust_n - tare_n;
+  return reverse_thrust ? -thrust : thrust;
+}
+
+results::StepMean ImportedTable::step(std::size_t index) const {
+  const StandRow& row = rows[index];
   results::StepMean step;
-  step.repetition = 1;
-  step.speed_rad_s = from_rpm(speed_rpm).value();
-  step.thrust_n = thrust_n;
+  step.propeller = propeller;
+  step.blades = blades;
+  step.diameter_in = diameter_in;
+  step.occlusion_deg = row.occlusion_deg.value_or(0);
+  step.repetition = static_cast<int>(row.repetition.value_or(1));
+  step.step = static_cast<int>(index);
+  step.speed_rad_s = speed_rad_s(index);
+  step.thrust_n = thrust_n(index);
   step.speed_n = step.thrust_samples = 1;
-  for (const auto member :
-       {&results::StepMean::speed_sd_rad_s, &results::StepMean::thrust_sd_n, &results::StepMean::torque_nm,
-        &results::StepMean::torque_sd_nm, &results::StepMean::supply_voltage_v, &results::StepMean::supply_current_a,
-        &results::StepMean::motor_current_a, &results::StepMean::coil_temperature_degc})
-    step.*member = kNotMeasured;
+  step.speed_sd_rad_s = step.thrust_sd_n = step.torque_sd_nm = kNotMeasured;
+  step.torque_nm = row.torque_nm.value_or(kNotMeasured);
+  step.zero_n = reverse_thrust ? -tare_n : tare_n;
+  step.supply_voltage_v = row.voltage_v.value_or(kNotMeasured);
+  step.supply_current_a = row.current_a.value_or(kNotMeasured);
+  step.motor_current_a = step.coil_temperature_degc = kNotMeasured;
+  step.window_begin_s = step.window_end_s = row.time_s.value_or(0);
+  step.quality_flags = quality_flags[index];
   return step;
+}
+
+std::vector<Point> points_of(const ImportedTable& imported) {
+  std::vector<Point> points;
+  points.reserve(imported.size());
+  for (std::size_t i = 0; i < imported.size(); ++i) points.push_back({imported.speed_rad_s(i), imported.thrust_n(i)});
+  return points;
 }
 
 SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
@@ -416,36 +509,39 @@ SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
   return source;
 }
 
-ImportedTable select_rows(const StandLog& log, const RowSelection& selection) {
+ImportedTable select_rows(StandLog log, const RowSelection& selection) {
   const SpeedSource source = choose_speed(log, selection);
   ImportedTable imported;
+  imported.speed = source == SpeedSource::electrical ? &StandRow::electrical_rpm : &StandRow::optical_rpm;
+  imported.speed_factor = selection.speed_factor;
   imported.tare_n = tare_of(log, selection, source);
+  imported.reverse_thrust = selection.reverse_thrust;
+  imported.propeller = std::filesystem::path(log.path).stem().string();
   imported.unit = log.thrust_unit;
   imported.speed_source = source == SpeedSource::electrical ? "electrical" : "optical";
   imported.rows_total = log.rows.size() + log.problems.size();
-  imported.problems = log.problems;
-  imported.unread = log.unread;
-  for (const StandRow& row : log.rows) {
-    if (!(rpm_of(row, source).value_or(0) > selection.speed_above_rpm)) continue;
-    if (selection.throttle_above_us && !(row.throttle_us.value_or(0) > *selection.throttle_above_us)) continue;
-    results::StepMean step = step_of(row, selection, source, imported.tare_n);
-    step.propeller = std::filesystem::path(log.path).stem().string();
-    step.step = static_cast<int>(imported.steps.size());
-    imported.steps.push_back(std::move(step));
-    imported.lines.push_back(row.line);
-  }
-  if (imported.steps.empty()) {
+  imported.problems = std::move(log.problems);
+  imported.unread = std::move(log.unread);
+  const auto left_out = [&](const StandRow& row) {
+    return !(rpm_of(row, source).value_or(0) > selection.speed_above_rpm) ||
+           (selection.throttle_above_us && !(row.throttle_us.value_or(0) > *selection.throttle_above_us));
+  };
+  if (std::ranges::all_of(log.rows, left_out)) {
     refuse(log.path, fmt::format("no row with {} speed above {} RPM{}", imported.speed_source,
                                  selection.speed_above_rpm, selection.speed ? "; try the other speed" : ""));
   }
   refuse_blind_speed(log, source);
-  refuse_reversed_thrust(imported.steps, log.path);
+  imported.rows = std::move(log.rows);
+  std::erase_if(imported.rows, left_out);
+  imported.quality_flags.resize(imported.size());
+  refuse_reversed_thrust(imported, log.path);
   return imported;
 }
 
-void refuse_reversed_thrust(const std::vector<results::StepMean>& steps, const std::string& path) {
+void refuse_reversed_thrust(const ImportedTable& imported, const std::string& path) {
   double sum = 0;
-  for (const results::StepMean& step : steps) sum += step.thrust_n * step.speed_rad_s * step.speed_rad_s;
+  for (std::size_t i = 0; i < imported.size(); ++i)
+    sum += imported.thrust_n(i) * imported.speed_rad_s(i) * imported.speed_rad_s(i);
   if (sum < 0) refuse(path, "thrust falls with speed: its sign is reversed; import with --reverse-thrust");
 }
 

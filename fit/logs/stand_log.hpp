@@ -2,6 +2,7 @@
 // A, degrees.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,26 +11,41 @@
 #include <vector>
 
 #include "base/csv.hpp"
+#include "fit/model/thrust_fit.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
 enum class SpeedSource : std::uint8_t { electrical, optical };
 
-/// One line of the file; nullopt for a channel that is absent or empty.
+/// A number that a log may lack: std::optional<double> in half the memory. Never NaN.
+class Reading {
+ public:
+  Reading() = default;
+  Reading(double value) : value_(value) {}
+  explicit operator bool() const { return !std::isnan(value_); }
+  double operator*() const { return value_; }
+  bool operator==(double other) const { return value_ == other; }
+  [[nodiscard]] double value_or(double other) const { return *this ? value_ : other; }
+
+ private:
+  double value_ = results::kNotMeasured;
+};
+
+/// One line of the file; a channel that is absent or empty has no reading.
 struct StandRow {
   std::size_t line = 0;
-  std::optional<double> time_s{};
-  std::optional<double> throttle_us{};
-  std::optional<double> electrical_rpm{};  ///< counted by the speed controller: needs the motor's pole count
-  std::optional<double> optical_rpm{};     ///< or of the only source there is
+  Reading time_s{};
+  Reading throttle_us{};
+  Reading electrical_rpm{};  ///< counted by the speed controller: needs the motor's pole count
+  Reading optical_rpm{};     ///< or of the only source there is
   double thrust_n = 0;
-  std::optional<double> torque_nm{};
-  std::optional<double> voltage_v{};
-  std::optional<double> current_a{};
-  std::optional<double> target_rpm{};  ///< what a script asked for
-  std::optional<double> occlusion_deg{};
-  std::optional<double> repetition{};  ///< a whole number from 1
+  Reading torque_nm{};
+  Reading voltage_v{};
+  Reading current_a{};
+  Reading target_rpm{};  ///< what a script asked for
+  Reading occlusion_deg{};
+  Reading repetition{};  ///< a whole number from 1
 };
 
 struct StandLog {
@@ -43,7 +59,7 @@ struct StandLog {
   std::vector<TableProblem> not_numbers{};  ///< values left out of a row that is kept
 };
 
-[[nodiscard]] inline std::optional<double> rpm_of(const StandRow& row, SpeedSource source) {
+[[nodiscard]] inline Reading rpm_of(const StandRow& row, SpeedSource source) {
   return source == SpeedSource::electrical ? row.electrical_rpm : row.optical_rpm;
 }
 
@@ -76,7 +92,7 @@ struct HeaderName {
 [[nodiscard]] std::optional<double> unit_factor(Measure measure, std::string_view unit);
 
 /// What a column contains, by the member of a row; kThrust: the thrust, which every row has.
-using Role = std::optional<double> StandRow::*;
+using Role = Reading StandRow::*;
 inline constexpr Role kThrust = nullptr;
 
 struct ColumnRole {
@@ -98,13 +114,13 @@ struct CsvDialect {
 /// A table of any make with the given columns. Needs a thrust and a speed. Throws ConfigurationError (path:line) when a
 /// column is missing or there twice, its unit is unknown, not given, or another one in header and role. Skips and lists
 /// the lines whose thrust is not a number.
-[[nodiscard]] StandLog read_columns(std::string_view text, std::string path, const std::vector<ColumnRole>& columns,
+[[nodiscard]] StandLog read_columns(TextBlocks text, std::string path, const std::vector<ColumnRole>& columns,
                                     const CsvDialect& dialect = {});
 
 /// A table of a Tyto/RCbenchmark stand (Series 1520, 1580/1585, 1780). Its columns have known names; their units differ
 /// between files. The file does not say which speed is right: the electrical one needs the motor's pole count. Throws
 /// as read_columns does; skips and lists a column in an unknown unit, unless it is the thrust or a speed.
-[[nodiscard]] StandLog read_rcbenchmark(std::string_view text, std::string path, const CsvDialect& dialect = {});
+[[nodiscard]] StandLog read_rcbenchmark(TextBlocks text, std::string path, const CsvDialect& dialect = {});
 
 /// Which rows become steps, and how.
 struct RowSelection {
@@ -121,28 +137,41 @@ struct RowSelection {
 /// Rows that scatter by more than this share of the largest thrust cannot give a zero.
 inline constexpr double kTareScatterMax = 0.02;
 
+/// The rows that were taken, and what makes steps of them.
 struct ImportedTable {
-  std::vector<results::StepMean> steps;  ///< repetition 1, φ = 0 unless the file says; `step` counts the rows used
-  std::vector<std::size_t> lines;        ///< of each step, in the file
-  double tare_n = 0;                     ///< subtracted from every thrust
-  std::string unit;                      ///< of thrust in the file, or what it was computed from
+  std::vector<StandRow> rows;
+  std::vector<std::uint32_t> quality_flags;  ///< of each row
+  Role speed = &StandRow::optical_rpm;
+  double speed_factor = 1;
+  double tare_n = 0;  ///< subtracted from every thrust
+  bool reverse_thrust = false;
+  std::string propeller;
+  int blades = 0;
+  double diameter_in = 0;
+  std::string unit;  ///< of thrust in the file, or what it was computed from
   std::string speed_source;
   std::size_t rows_total = 0;
   std::vector<TableProblem> problems;
   std::vector<std::string> unread;  ///< columns skipped, with the reason
+
+  [[nodiscard]] std::size_t size() const { return rows.size(); }
+  [[nodiscard]] double speed_rad_s(std::size_t row) const;
+  [[nodiscard]] double thrust_n(std::size_t row) const;
+  /// Repetition 1, φ = 0 unless the file says; `step` counts the rows. What a row cannot give is not measured.
+  [[nodiscard]] results::StepMean step(std::size_t row) const;
 };
 
-/// A step from one row: what a row cannot give is not measured.
-[[nodiscard]] results::StepMean step_of_row(double speed_rpm, double thrust_n);
+/// One point a row, without uncertainties.
+[[nodiscard]] std::vector<Point> points_of(const ImportedTable& imported);
 
 /// The source that `selection` takes. Throws ConfigurationError if the file does not have it.
 [[nodiscard]] SpeedSource choose_speed(const StandLog& log, const RowSelection& selection);
 
 /// Throws ConfigurationError (path:line) when the chosen channel is missing, no row is left, the rows for the tare are
 /// too few or scatter too much, the speed reads 0 in most rows with thrust, or thrust falls with speed (reversed sign).
-[[nodiscard]] ImportedTable select_rows(const StandLog& log, const RowSelection& selection = {});
+[[nodiscard]] ImportedTable select_rows(StandLog log, const RowSelection& selection = {});
 
 /// Σ T ω² must be positive. Throws ConfigurationError at path:1 otherwise.
-void refuse_reversed_thrust(const std::vector<results::StepMean>& steps, const std::string& path);
+void refuse_reversed_thrust(const ImportedTable& imported, const std::string& path);
 
 }  // namespace kphi::fit

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -20,14 +21,14 @@ struct Scale {
   double thrust = 0;
 };
 
-struct ThrustResidual {
-  double speed;
-  double thrust_value;
-  double root_weight;
+/// One equation: coefficients of k, linear and offset, and their sum.
+struct Equation {
+  std::array<double, 3> terms{};
+  double sum = 0;
 
   template <class Scalar>
   bool operator()(const Scalar* k, const Scalar* linear, const Scalar* offset, Scalar* residual) const {
-    residual[0] = root_weight * (thrust_value - thrust(ThrustParameters<Scalar>{*k, *linear, *offset}, speed));
+    residual[0] = sum - terms[0] * *k - terms[1] * *linear - terms[2] * *offset;
     return true;
   }
 };
@@ -57,8 +58,10 @@ Scale scale_of(const std::vector<Point>& points) {
 
 void require_distinct_speeds(const std::vector<Point>& points, std::size_t terms) {
   std::set<double> speeds;
-  for (const Point& point : points) speeds.insert(point.speed_rad_s);
-  if (speeds.size() >= terms) return;
+  for (const Point& point : points) {
+    speeds.insert(point.speed_rad_s);
+    if (speeds.size() >= terms) return;
+  }
   throw FitError(fmt::format("thrust fit: {} different speeds are too few for {} terms; measure at more speeds",
                              speeds.size(), terms));
 }
@@ -79,8 +82,9 @@ void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParamete
   for (Point& point : points) point.weight *= static_cast<double>(points.size()) / sum;
 }
 
-/// Null for Loss::none. `sigma` in units of the residuals.
+/// `sigma` in units of the residuals. Null for 0: points without scatter have no outliers.
 std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
+  if (!(sigma > 0)) return nullptr;
   if (loss == Loss::huber) return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
   if (loss == Loss::cauchy) return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
   if (loss == Loss::tukey) return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
@@ -94,29 +98,22 @@ class Fitter {
 
   /// With their present weights.
   void take(const std::vector<Point>& points) {
-    problem_ = std::make_unique<ceres::Problem>(problem_options());
-    for (const Point& point : points) {
-      problem_->AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ThrustResidual, 1, 1, 1, 1>(new ThrustResidual{
-              point.speed_rad_s / scale_.speed, point.thrust_n / scale_.thrust, std::sqrt(point.weight)}),
-          &changing_loss_, &k_, &linear_, &offset_);
-    }
-    if (terms_ < 2) problem_->SetParameterBlockConstant(&offset_);
-    if (terms_ < 3) problem_->SetParameterBlockConstant(&linear_);
+    squares_ = problem_of(triangle_of(points));
+    robust_.reset();
   }
 
   /// Solves for the points taken last. A `coarse` solution only gives the start and the scale of the next one.
   void solve(const std::vector<Point>& points, Loss loss, bool coarse = false) {
-    std::vector<double> deviations;
-    for (const Point& point : points) deviations.push_back(std::abs(residual(point)));
-    const double sigma = loss == Loss::none ? 0 : 1.4826 * upper_median(std::move(deviations));
-    loss_ = sigma > 0 ? loss_function(loss, sigma) : nullptr;  // points without scatter have no outliers
+    loss_ = loss == Loss::none ? nullptr : loss_function(loss, deviation_of(points));
+    if (!loss_) return solve_exactly(*squares_, "thrust fit", coarse ? 1 : 4);
     changing_loss_.Reset(loss_.get(), ceres::DO_NOT_TAKE_OWNERSHIP);
-    if (loss_) {
-      solve_robustly(*problem_, "thrust fit", coarse ? 1e-4 : 1e-14);
-    } else {
-      solve_exactly(*problem_, "thrust fit", coarse ? 1 : 4);
+    if (!robust_) {
+      std::vector<Equation> equations;
+      equations.reserve(points.size());
+      for (const Point& point : points) equations.push_back(equation_of(point));
+      robust_ = problem_of(equations);
     }
+    solve_robustly(*robust_, "thrust fit", coarse ? 1e-4 : 1e-14);
     residuals_.clear();
     for (const Point& point : points) residuals_.push_back(residual(point));
   }
@@ -125,9 +122,9 @@ class Fitter {
     return {k_ * unit(0), linear_ * unit(1), offset_ * unit(2)};
   }
 
-  [[nodiscard]] std::vector<double> robust_weights() const {
-    std::vector<double> weights;
-    for (const double r : residuals_) weights.push_back(rho(r)[1]);
+  [[nodiscard]] std::vector<double> robust_weights(std::size_t points) const {
+    std::vector<double> weights(points, 1.0);
+    if (loss_) std::ranges::transform(residuals_, weights.begin(), [this](double r) { return rho(r)[1]; });
     return weights;
   }
 
@@ -137,7 +134,7 @@ class Fitter {
     std::vector<std::size_t> places{0};
     if (terms_ >= 3) (blocks.push_back(&linear_), places.push_back(1));
     if (terms_ >= 2) (blocks.push_back(&offset_), places.push_back(2));
-    const std::vector<double> unit_matrix = unit_covariance(*problem_, blocks, "thrust fit");
+    const std::vector<double> unit_matrix = unit_covariance(*squares_, blocks, "thrust fit");
     const double variance = loss_ ? robust_variance() : std::pow(rms_n / scale_.thrust, 2);
     std::array<std::array<double, 3>, 3> result{};
     for (std::size_t i = 0; i < terms_; ++i) {
@@ -152,10 +149,56 @@ class Fitter {
     return scale_.thrust / std::pow(scale_.speed, 2 - static_cast<double>(term));
   }
 
+  [[nodiscard]] Equation equation_of(const Point& point) const {
+    const double root = std::sqrt(point.weight), speed = point.speed_rad_s / scale_.speed;
+    return {{root * speed * speed, terms_ < 3 ? 0 : root * speed, terms_ < 2 ? 0 : root},
+            root * point.thrust_n / scale_.thrust};
+  }
+
+  /// Four equations whose least squares are those of all points: R of a QR decomposition, block by block.
+  [[nodiscard]] std::vector<Equation> triangle_of(const std::vector<Point>& points) const {
+    constexpr Eigen::Index kBlock = 256, kColumns = 4;
+    Eigen::Matrix<double, kBlock, kColumns> rows;
+    Eigen::Index filled = kColumns;
+    rows.topRows<kColumns>().setZero();
+    const auto reduce = [&] {
+      const Eigen::MatrixXd block = rows.topRows(filled);
+      rows.topRows<kColumns>() = block.householderQr().matrixQR().topRows<kColumns>().triangularView<Eigen::Upper>();
+      filled = kColumns;
+    };
+    for (const Point& point : points) {
+      const auto [terms, sum] = equation_of(point);
+      rows.row(filled) << terms[0], terms[1], terms[2], sum;
+      if (++filled == kBlock) reduce();
+    }
+    reduce();
+    std::vector<Equation> triangle;
+    for (Eigen::Index i = 0; i < kColumns; ++i) triangle.push_back({{rows(i, 0), rows(i, 1), rows(i, 2)}, rows(i, 3)});
+    return triangle;
+  }
+
+  [[nodiscard]] std::unique_ptr<ceres::Problem> problem_of(const std::vector<Equation>& equations) {
+    auto problem = std::make_unique<ceres::Problem>(problem_options());
+    for (const Equation& equation : equations) {
+      problem->AddResidualBlock(new ceres::AutoDiffCostFunction<Equation, 1, 1, 1, 1>(new Equation(equation)),
+                                &changing_loss_, &k_, &linear_, &offset_);
+    }
+    if (terms_ < 2) problem->SetParameterBlockConstant(&offset_);
+    if (terms_ < 3) problem->SetParameterBlockConstant(&linear_);
+    return problem;
+  }
+
   [[nodiscard]] double residual(const Point& point) const {
     const ThrustParameters<double> scaled{k_, linear_, offset_};
     return std::sqrt(point.weight) *
            (point.thrust_n / scale_.thrust - thrust(scaled, point.speed_rad_s / scale_.speed));
+  }
+
+  /// Of the residuals, by their median.
+  [[nodiscard]] double deviation_of(const std::vector<Point>& points) const {
+    std::vector<double> deviations;
+    for (const Point& point : points) deviations.push_back(std::abs(residual(point)));
+    return 1.4826 * upper_median(std::move(deviations));
   }
 
   /// ρ, ρ', ρ'' of the squared residual.
@@ -182,8 +225,9 @@ class Fitter {
   double k_ = 0, linear_ = 0, offset_ = 0;
   std::unique_ptr<ceres::LossFunction> loss_;
   ceres::LossFunctionWrapper changing_loss_{nullptr, ceres::DO_NOT_TAKE_OWNERSHIP};
-  std::unique_ptr<ceres::Problem> problem_;
-  std::vector<double> residuals_;
+  std::unique_ptr<ceres::Problem> squares_;  ///< four equations that stand for all points
+  std::unique_ptr<ceres::Problem> robust_;   ///< one equation a point, where a loss judges each
+  std::vector<double> residuals_;            ///< under a loss
 };
 
 void judge(ThrustFit& fit, std::size_t terms) {
@@ -194,6 +238,7 @@ void judge(ThrustFit& fit, std::size_t terms) {
     sum_wt += weight * fit.points[i].thrust_n;
   }
   double residual_sum = 0, total_sum = 0;
+  fit.residuals_n.reserve(fit.n);
   for (std::size_t i = 0; i < fit.n; ++i) {
     const Point& point = fit.points[i];
     const double residual = point.thrust_n - thrust(fit.parameters, point.speed_rad_s);
@@ -210,10 +255,10 @@ void judge(ThrustFit& fit, std::size_t terms) {
 
 }  // namespace
 
-ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options) {
+ThrustFit fit_thrust(std::vector<Point> points, const ThrustFitOptions& options) {
   ThrustFit fit;
   require_numbers(points);
-  fit.points.assign(points.begin(), points.end());
+  fit.points = std::move(points);
   fit.n = fit.points.size();
   const auto terms = static_cast<std::size_t>(options.form);
   if (fit.n < terms + 1) {
@@ -239,7 +284,7 @@ ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& opti
     solve(options.loss == Loss::none ? Loss::none : Loss::huber);
   }
   if (options.loss != Loss::none) solve(options.loss);
-  fit.robust_weights = fitter.robust_weights();
+  fit.robust_weights = fitter.robust_weights(fit.n);
   judge(fit, terms);
   fit.covariance = fitter.covariance(fit.rms_n);
   const auto error = [&](std::size_t i) { return std::sqrt(fit.covariance[i][i]); };

@@ -87,7 +87,7 @@ inline constexpr double kRejectedWeight = 0.25;
 
 /// Throws FitError when there are fewer points than free terms + 1, when a number is not finite, a
 /// weight not positive, an uncertainty missing that `weighting` needs, or the points too alike to fit all terms.
-[[nodiscard]] ThrustFit fit_thrust(std::span<const Point> points, const ThrustFitOptions& options = {});
+[[nodiscard]] ThrustFit fit_thrust(std::vector<Point> points, const ThrustFitOptions& options = {});
 
 /// k at one speed. On real propellers it differs from the k of a range, since k rises with speed.
 struct SpeedCoefficient {

@@ -65,7 +65,8 @@ struct BenchUncertainty {
   std::optional<double> mounting;
 };
 
-/// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density, mounting. Throws ConfigurationError.
+/// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density, mounting. Throws
+/// ConfigurationError.
 void set_uncertainty(BenchUncertainty& bench, const std::string& text);
 
 /// NAME and VALUE of those that are known, as set_uncertainty reads them.

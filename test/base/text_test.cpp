@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <random>
 
 #include "test/temporary_folder.hpp"
 
@@ -39,6 +40,24 @@ TEST_F(TextFile, ThatIsNoneIsRefusedWithoutWaiting) {
   const auto fifo = folder_.path() / "fifo";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   refused(fifo, "is a pipe or a device; name a file");
+}
+
+TEST_F(TextFile, IsHandedOutInBlocksOfWholeLines) {
+  std::mt19937 random(1);
+  std::string text;
+  while (text.size() < 5u << 20) text += std::string(random() % 200, static_cast<char>('a' + random() % 26)) + '\n';
+  text.insert(2u << 20, std::string(3u << 20, 'x'));  // a line longer than a block
+  text += "the last line has no end";
+  kphi::TextFile blocks(file(text), text.size());
+  std::string joined;
+  std::size_t count = 0;
+  for (std::string_view block = blocks.next_block(); !block.empty(); block = blocks.next_block(), ++count) {
+    joined += block;
+    EXPECT_TRUE(block.ends_with('\n') || joined.size() == text.size());
+  }
+  EXPECT_TRUE(joined == text);
+  EXPECT_GT(count, 3u);
+  EXPECT_TRUE(blocks.next_block().empty());
 }
 
 TEST(Printable, LeavesTextInUtf8AsItIs) {

@@ -2,10 +2,7 @@
 // (replay_peer.py), both as commands with all that their start takes, interleaved, files in the page cache. kphi takes
 // a thread per processor, numpy one; the CPU time of both is compared, too. First that both say the same.
 // Usage: kphi_replay_bench [runs [pairs]]; 15 runs are 9.1 million samples.
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,6 +15,7 @@
 #include "results/campaign_folder.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/steps_csv.hpp"
+#include "test/bench/command_cost.hpp"
 #include "test/bench/figures.hpp"
 #include "test/results/synthetic_run.hpp"
 #include "test/source_dir.hpp"
@@ -25,6 +23,8 @@
 namespace {
 
 using namespace kphi;
+using bench::Cost;
+using bench::cost_of;
 using results::CampaignFolder;
 using results::StepMean;
 
@@ -60,33 +60,6 @@ std::size_t make_campaign(const CampaignFolder& folder, int runs, std::vector<St
   }
   results::write_steps(folder.steps(), steps);
   return samples;
-}
-
-struct Cost {
-  double wall_s = 0, cpu_s = 0;
-  int code = 0;
-};
-
-/// A command with its output in `out`.
-Cost cost_of(const std::string& out, const std::vector<std::string>& command) {
-  std::vector<char*> arguments;
-  for (const std::string& word : command) arguments.push_back(const_cast<char*>(word.c_str()));
-  arguments.push_back(nullptr);
-  const auto begun = std::chrono::steady_clock::now();
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::dup2(::open(out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0644), STDOUT_FILENO);
-    ::execv(arguments.front(), arguments.data());
-    ::_exit(127);
-  }
-  int status = 0;
-  rusage used{};
-  ::wait4(child, &status, 0, &used);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count(),
-          seconds(used.ru_utime) + seconds(used.ru_stime), WIFEXITED(status) ? WEXITSTATUS(status) : -1};
 }
 
 /// Largest relative difference of thrust between the two, over the steps; infinite when the peer has not as many.

@@ -116,11 +116,20 @@ TEST(StepsCsv, IsReadByTheNamesOfItsColumns) {
   EXPECT_THAT(complaint("propeller\n"), HasSubstr("steps.csv:1: column blades is missing"));
 }
 
+TEST(StepsCsv, AreTheSameMadeOneByOne) {
+  const TemporaryFolder folder;
+  std::vector<StepMean> steps(20'000);  // more than one piece
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i].step = static_cast<int>(i);
+  steps.back().air_density_kg_m3 = 1.2;
+  write_steps(folder / "steps.csv", {steps.size(), [&](std::size_t i) { return steps[i]; }});
+  EXPECT_TRUE(read_text(folder / "steps.csv") == format_steps(steps));
+}
+
 TEST(StepsCsv, FilesAreReplacedWhole) {
   const TemporaryFolder folder;
   const StepMean step;
   write_steps(folder / "steps.csv", std::span(&step, 1));
-  write_steps(folder / "steps.csv", {});
+  write_steps(folder / "steps.csv", std::vector<StepMean>());
   EXPECT_THAT(read_steps(folder / "steps.csv"), IsEmpty());
   EXPECT_FALSE(std::filesystem::exists(folder / "steps.csv.part"));
   EXPECT_THROW((void)read_steps(folder / "none.csv"), RecordError);

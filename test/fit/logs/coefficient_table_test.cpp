@@ -21,8 +21,8 @@ TEST(UiucTable, TakesTheDiameterFromTheName) {
 
 TEST(UiucTable, TurnsTheCoefficientIntoThrust) {
   const auto imported = read_uiuc("RPM CT CP\r\n6000 0.1 0.05\r\n", "apc_10x7_s.txt");
-  EXPECT_NEAR(imported.steps[0].thrust_n, 0.1 * 1.225 * 100 * 100 * std::pow(0.254, 4), 1e-12);
-  EXPECT_NEAR(imported.steps[0].speed_rad_s, 628.3185307, 1e-6);
+  EXPECT_NEAR(imported.step(0).thrust_n, 0.1 * 1.225 * 100 * 100 * std::pow(0.254, 4), 1e-12);
+  EXPECT_NEAR(imported.step(0).speed_rad_s, 628.3185307, 1e-6);
   EXPECT_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt"), ConfigurationError) << "no diameter";
   EXPECT_NO_THROW((void)read_uiuc("RPM CT\n6000 0.1\n", "table.txt", 10));
   EXPECT_THROW((void)read_uiuc("RPM CP\n6000 0.1\n", "a_10x7.txt"), ConfigurationError);
@@ -85,8 +85,8 @@ TEST(Tables, NoMutationOfATableCrashesAReader) {
       if (edit == 3) text.insert(at, text.substr(random() % text.size(), random() % 40));
     }
     try {
-      accepted += trial % 3 == 0   ? select_rows(read_rcbenchmark(text, "x.csv")).steps.size()
-                  : trial % 3 == 1 ? read_uiuc(text, "apc_5x4_x.txt").steps.size()
+      accepted += trial % 3 == 0   ? select_rows(read_rcbenchmark(text, "x.csv")).size()
+                  : trial % 3 == 1 ? read_uiuc(text, "apc_5x4_x.txt").size()
                                    : read_k_table(text, "K.csv", "N/RPM^2").size();
     } catch (const ConfigurationError&) {
       ++refused;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "base/error.hpp"
 
 namespace kphi::fit {
@@ -38,6 +40,32 @@ TEST(Csv, ReadsQuotedFields) {
   ASSERT_EQ(table.rows.size(), 1u);
   EXPECT_THAT(table.rows[0].fields, ElementsAre("1,5", "say \"hi\""));
   EXPECT_EQ(table.problems.size(), 2u);
+}
+
+TEST(Csv, ReadsBlocksAsItReadsTheWhole) {
+  const std::string text = "\xEF\xBB\xBF\na,b\n1,2\n\n\"open,2\n3,4,5\r\n6,7";
+  const Table whole = read_csv(text, "t.csv");
+  ASSERT_EQ(whole.rows.size(), 2u);
+  for (std::size_t cuts = 0; cuts < 64; ++cuts) {  // after each line or not
+    std::vector<std::string_view> blocks;
+    std::size_t begin = 0, at = 0;
+    for (int line = 0; (at = text.find('\n', at)) != std::string::npos; ++line) {
+      ++at;
+      if ((cuts >> line & 1) == 0) continue;
+      blocks.push_back(std::string_view(text).substr(begin, at - begin));
+      begin = at;
+    }
+    blocks.push_back(std::string_view(text).substr(begin));
+    std::size_t next = 0;
+    const Table table =
+        read_csv(TextBlocks([&] { return next < blocks.size() ? blocks[next++] : std::string_view(); }), "t.csv");
+    EXPECT_EQ(table.header, whole.header) << cuts;
+    ASSERT_EQ(table.rows.size(), whole.rows.size()) << cuts;
+    EXPECT_EQ(table.rows[1].line, whole.rows[1].line);
+    EXPECT_EQ(table.rows[1].fields, whole.rows[1].fields);
+    ASSERT_EQ(table.problems.size(), whole.problems.size());
+    EXPECT_EQ(table.problems[1].line, whole.problems[1].line);
+  }
 }
 
 TEST(Csv, FindsColumnsByNameInAnyOrder) {

@@ -66,9 +66,7 @@ Names found(const StandLog& log, const RowSelection& selection = {}) { return na
 std::vector<std::uint32_t> flags(const StandLog& log) {
   ImportedTable table = select_rows(log);
   flag_steps(table, audit(log, {}));
-  std::vector<std::uint32_t> result;
-  for (const results::StepMean& step : table.steps) result.push_back(step.quality_flags);
-  return result;
+  return table.quality_flags;
 }
 
 TEST(LogAudit, FindsNothingInCleanLogs) {

@@ -93,10 +93,10 @@ TEST(NamedColumns, KeepsOcclusionAndRepetitionInTheSteps) {
   ImportOptions options;
   options.columns = roles({"thrust=f", "speed=n", "occlusion=phi", "repetition=rep"});
   const Import import = import_table("f (N),n (rpm),phi (deg),rep\n1,6000,90,2\n2,9000,90,2\n", "own.csv", options);
-  ASSERT_EQ(import.table.steps.size(), 2u);
-  EXPECT_EQ(import.table.steps[0].occlusion_deg, 90);
-  EXPECT_EQ(import.table.steps[0].repetition, 2);
-  EXPECT_EQ(import.table.steps[0].propeller, "own");
+  ASSERT_EQ(import.table.size(), 2u);
+  EXPECT_EQ(import.table.step(0).occlusion_deg, 90);
+  EXPECT_EQ(import.table.step(0).repetition, 2);
+  EXPECT_EQ(import.table.step(0).propeller, "own");
 }
 
 TEST(ColumnUnit, StandsInBracketsOfEitherKindOrBehindAnUnderscore) {
@@ -131,7 +131,7 @@ std::string table_refusal(const std::string& text, const RowSelection& selection
 }
 
 double rpm_of(const StandLog& log, const RowSelection& selection) {
-  return to_rpm(RadPerSec(select_rows(log, selection).steps[0].speed_rad_s));
+  return to_rpm(RadPerSec(select_rows(log, selection).step(0).speed_rad_s));
 }
 
 TEST(Rcbenchmark, ConvertsTheUnitOfTheHeader) {
@@ -175,7 +175,7 @@ TEST(Rcbenchmark, RefusesReversedThrustUnlessTold) {
   const std::string reversed = table("0,1100,-100,6000,0,11.1,,\n1,1200,-200,9000,0,11.1,,\n");
   EXPECT_THAT(table_refusal(reversed), HasSubstr("--reverse-thrust"));
   const auto mended = select_rows(read_rcbenchmark(reversed, "log.csv"), {.reverse_thrust = true});
-  EXPECT_GT(mended.steps[0].thrust_n, 0);
+  EXPECT_GT(mended.step(0).thrust_n, 0);
 }
 
 TEST(Rcbenchmark, TaresWithRowsOfAStillMotorOnly) {
@@ -183,7 +183,7 @@ TEST(Rcbenchmark, TaresWithRowsOfAStillMotorOnly) {
       table("0,1000,-10,0,0,11,,\n1,1000,-12,0,0,11,,\n2,1100,-99,0,0,11,,\n3,1200,89,6000,0,11,,\n");
   const auto imported = select_rows(read_rcbenchmark(log, "log.csv"), {.tare_rows = 2});
   EXPECT_NEAR(imported.tare_n, -11 * 9.80665e-3, 1e-15);
-  EXPECT_NEAR(imported.steps[0].thrust_n, 100 * 9.80665e-3, 1e-15);
+  EXPECT_NEAR(imported.step(0).thrust_n, 100 * 9.80665e-3, 1e-15);
   EXPECT_THAT(table_refusal(log, {.tare_rows = 3}), HasSubstr("2 rows with the motor off, but --tare-rows asks for 3"));
 }
 
@@ -217,11 +217,11 @@ TEST(Rcbenchmark, SaysThatASpeedIsBlindBeforeItSaysReversed) {
   EXPECT_THAT(refusal([&] { return select_rows(log); }),
               HasSubstr("the electrical speed reads 0 in 20 of 20 rows with thrust: its sensor does not see the "
                         "propeller; take the other with --speed optical"));
-  EXPECT_EQ(select_rows(log, {.speed = SpeedSource::optical}).steps.size(), 20u);
+  EXPECT_EQ(select_rows(log, {.speed = SpeedSource::optical}).size(), 20u);
 }
 
 TEST(Rcbenchmark, NamesTheOptionThatReadsADecimalComma) {
-  constexpr const char* kText = "Thrust (N);Motor Optical Speed (RPM)\n1,5;6000\n2,5;7000\n";
+  static constexpr const char* kText = "Thrust (N);Motor Optical Speed (RPM)\n1,5;6000\n2,5;7000\n";
   EXPECT_THAT(refusal([] { return read_rcbenchmark(kText, "log.csv", {.separator = 0}); }),
               HasSubstr("log.csv:2: \"1,5\" has a decimal comma; import with --decimal-comma"));
   EXPECT_EQ(read_rcbenchmark(kText, "log.csv", {.separator = 0, .decimal_comma = true}).rows.at(1).thrust_n, 2.5);
@@ -248,8 +248,9 @@ TEST(Import, WritesItsCoefficientDown) {
   ImportOptions options;
   options.columns = roles({"thrust=f:N", "speed=n:RPM"});
   constexpr const char* kText = "f,n\n1,5000\n4,10000\n9,15000\n";
-  const auto record =
-      nlohmann::json::parse(import_record(import_table(kText, "log.csv", options), kText, "log.csv", options, "1"));
+  const Import import = import_table(kText, "log.csv", options);
+  const auto record = nlohmann::json::parse(
+      import_record(import, fit_thrust(points_of(import.table)), "0123", "log.csv", options, "1"));
   EXPECT_NEAR(record["k_n_s2_per_rad2"].get<double>(), 4 / std::pow(from_rpm(10000).value(), 2), 1e-15);
 }
 

@@ -1,9 +1,8 @@
-#include "drivers/sim/physics/stand.hpp"
-
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
 #include "compensation/units.hpp"
+#include "drivers/sim/physics/stand.hpp"
 
 namespace kphi::sim::truth_test {
 
