@@ -42,9 +42,9 @@ std::string to_words(const results::RepetitionVerdict& verdict) {
   if (std::isnan(verdict.between_sd)) return words + "nothing to compare it with";
   const auto known = std::ranges::count_if(
       verdict.repetitions, [](const results::RepetitionFigure& figure) { return !std::isnan(figure.k); });
-  return words + fmt::format("spread {:.3f} %, expected up to {:.3f} % ({} repetitions)",
-                             100 * verdict.between_sd / std::abs(verdict.k),
-                             100 * verdict.within_u / std::abs(verdict.k), known);
+  return words + fmt::format("k scatters by {:.3f} % over {} repetitions, noise alone gives {:.3f} %",
+                             100 * verdict.between_sd / std::abs(verdict.k), known,
+                             100 * verdict.within_u / std::abs(verdict.k));
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <unordered_map>
 
+#include "results/reduction/clock_map.hpp"
 #include "results/reduction/zeros.hpp"
 #include "results/steps_csv.hpp"
 #include "test/soak/verdict_checks.hpp"
@@ -15,6 +17,7 @@ using results::QualityFlag;
 
 constexpr double kTrueDensity = 1.225;  // kg/m³, of the simulated bench
 constexpr Duration kMisplaced = 20ms;   ///< by the clock map and the delays of a wire
+constexpr double kMistimed = 10e-6;     ///< s, a sample on a wire of constant delay
 /// What short steps may say of themselves though nothing is wrong: three of them need not tell the lag, and a test of
 /// significance errs at times.
 constexpr auto kNeedNotTell = static_cast<std::uint32_t>(QualityFlag::lag_unknown);
@@ -70,6 +73,25 @@ void check_missing(const Evidence& evidence, const FileOfRun& file, const result
     return wrong.push_back(
         fmt::format("{}: records are missing in its window, it does not say so", step_name(file, step)));
   }
+}
+
+/// The time of each sample in the file is when the box took it, but for the delay of a wire without faults.
+void check_sample_times(const Evidence& evidence, const FileOfRun& file, Instant begin, Instant end, Lines& wrong) {
+  const sim::WireTruth& wire = *evidence.wire;
+  std::unordered_map<std::uint32_t, Instant> sampled;  // by ft_sequence
+  for (std::size_t i = 0; i < wire.ft.size(); ++i)
+    if (wire.sampled[i] >= begin && wire.sampled[i] <= end) sampled.emplace(wire.ft[i], wire.sampled[i]);
+  const std::vector<results::Nanoseconds> times = results::sample_times(file.run);
+  std::vector<double> late;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const auto truth = sampled.find(file.run.load_cell[i].ft_sequence);
+    if (truth != sampled.end()) late.push_back(to_seconds(Instant(times[i]) - truth->second));
+  }
+  if (late.empty()) return wrong.push_back("verdict: " + file.name() + " holds no sample that the box took");
+  const auto [least, most] = std::ranges::minmax(late);
+  if (most - least > kMistimed || std::abs(least) > to_seconds(kMisplaced))
+    wrong.push_back(fmt::format("verdict: {}: samples are timed {:.1f} to {:.1f} µs after they were taken", file.name(),
+                                1e6 * least, 1e6 * most));
 }
 
 /// The module's supply truly was outside of what the campaign tolerates, or at its edge, around the step's window.
@@ -130,6 +152,7 @@ void check_run(const Evidence& evidence, const FileOfRun& file, const Reaches& r
   }
   if (file.steps.size() != static_cast<std::size_t>(evidence.campaign.profile.steps))
     verdict.wrong.push_back(fmt::format("verdict: {} has {} steps", file.name(), file.steps.size()));
+  if (clean) check_sample_times(evidence, file, begin, end, verdict.wrong);
   if (clean && (flags & ~(kNeedNotTell | kByChance)) != 0)
     verdict.wrong.push_back(
         fmt::format("verdict: {} is out of reach of every fault, its flags are {}", file.name(), names(file.steps)));
