@@ -356,8 +356,7 @@ std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficie
   for (std::size_t i = 0; i < result.size(); ++i) {
     SpeedDependence& found = result[i];
     judge(angles[i], scatter, zero_movement, freedom, found);
-    const bool untested = !found.lack_of_fit.tested() && found.levels.size() > 2;
-    if ((untested || found.depends()) && !angles[i].complete.front().samples.empty())
+    if (found.depends() && !angles[i].complete.front().samples.empty())
       found.inadequacy = inadequacy_of(angles[i].complete);
     found.lack_of_fit.statistic = "F";
     found.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", found.phi_deg);

@@ -32,7 +32,7 @@ struct SpeedDependence {
   /// Either test at half the level, so that both together reject a true T = k ω² once in twenty.
   [[nodiscard]] bool depends() const { return lack_of_fit.p < kTestLevel / 2 || trend.p < kTestLevel / 2; }
   /// Rms deviation of the levels' k from the k of the range, weighted in ω⁴, beyond what noise explains, where k
-  /// depends on the speed; from one repetition with its noise. N/(rad/s)².
+  /// depends on the speed; of a single repetition with its noise. N/(rad/s)².
   double inadequacy = 0;
 };
 

@@ -81,7 +81,7 @@ void check_sample_times(const Evidence& evidence, const FileOfRun& file, Instant
   std::unordered_map<std::uint32_t, Instant> sampled;  // by ft_sequence
   for (std::size_t i = 0; i < wire.ft.size(); ++i)
     if (wire.sampled[i] >= begin && wire.sampled[i] <= end) sampled.emplace(wire.ft[i], wire.sampled[i]);
-  const std::vector<results::Nanoseconds> times = results::sample_times(file.run);
+  const std::vector<Nanoseconds> times = results::sample_times(file.run);
   std::vector<double> late;
   for (std::size_t i = 0; i < times.size(); ++i) {
     const auto truth = sampled.find(file.run.load_cell[i].ft_sequence);
