@@ -140,7 +140,9 @@ class TableReader {
 };
 
 Table read_table(TextBlocks text, std::string path, const auto& split, const TakeRow& take = {}) {
-  TableReader reader({.path = std::move(path)}, 0, take);
+  Table begin;
+  begin.path = std::move(path);
+  TableReader reader(std::move(begin), 0, take);
   std::string_view block = text.front();
   if (block.starts_with(kByteOrderMark)) block.remove_prefix(kByteOrderMark.size());
   for (; !block.empty(); text.pop(), block = text.front()) reader.read(block, split);
@@ -183,7 +185,7 @@ Table read_csv(TextBlocks text, std::string path, char separator, const TakeRow&
 }
 
 Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator, const TakeRow& take) {
-  TableReader reader({begin.path, begin.header_line, begin.header}, line - 1, take);
+  TableReader reader({begin.path, begin.header_line, begin.header, {}, {}}, line - 1, take);
   reader.read(block,
               [separator](std::string_view text, Fields& fields) { return split_separated(text, separator, fields); });
   return std::move(reader).table();

@@ -17,7 +17,7 @@ namespace kphi {
 
 namespace {
 
-constexpr std::size_t kBlock = std::size_t{1} << 20;
+constexpr std::size_t kBlock = std::size_t{1} << 20, kSmallBlock = std::size_t{1} << 12;
 
 [[noreturn]] void fail(const char* what, const char* next_move) {
   throw std::runtime_error(fmt::format("{}: {}; {}", what, std::strerror(errno), next_move));
@@ -33,13 +33,15 @@ TextFile::TextFile(const std::filesystem::path& path, std::size_t most_bytes)
   if (::fstat(file_.number(), &about) != 0) fail("cannot be read", "check the disk");
   if (S_ISDIR(about.st_mode)) throw std::runtime_error("is a folder; name a file");
   if (!S_ISREG(about.st_mode)) throw std::runtime_error("is a pipe or a device; name a file");
+  size_ = static_cast<std::size_t>(about.st_size);
 }
 
 std::size_t TextFile::read_more() {
   const std::size_t size = bytes_.size();
-  bytes_.resize(size + kBlock);
+  const std::size_t wanted = std::clamp(size_ - std::min(read_, size_), kSmallBlock, kBlock);
+  bytes_.resize(size + wanted);
   ssize_t got = 0;
-  while ((got = ::read(file_.number(), bytes_.data() + size, kBlock)) < 0 && errno == EINTR) {
+  while ((got = ::read(file_.number(), bytes_.data() + size, wanted)) < 0 && errno == EINTR) {
   }
   if (got < 0) fail("cannot be read", "check the disk");
   bytes_.resize(size + static_cast<std::size_t>(got));

@@ -22,17 +22,22 @@ namespace kphi {
 class TextBlocks {
  public:
   template <std::convertible_to<std::string_view> Text>
-  TextBlocks(const Text& whole) : front_(whole) {}
-  /// `next` gives the next block, which stays valid until it is called again; an empty one at the end.
-  explicit TextBlocks(std::function<std::string_view()> next) : next_(std::move(next)), front_(next_()) {}
+  TextBlocks(const Text& whole) : front_(whole), bytes_(front_.size()) {}
+  /// `next` gives the next block, which stays valid until it is called again; an empty one at the end. `bytes`: of the
+  /// whole text, about.
+  TextBlocks(std::function<std::string_view()> next, std::size_t bytes)
+      : next_(std::move(next)), front_(next_()), bytes_(bytes) {}
 
   /// The block at hand; empty at the end.
   [[nodiscard]] std::string_view front() const { return front_; }
   void pop() { front_ = next_ ? next_() : std::string_view(); }
+  /// Of the whole text, about: to make room for what it gives.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
   std::function<std::string_view()> next_;
   std::string_view front_;
+  std::size_t bytes_;
 };
 
 /// A file that is read in blocks of whole lines of about 1 MiB. Refuses as read_text_file does.
@@ -41,6 +46,8 @@ class TextFile {
   TextFile(const std::filesystem::path& path, std::size_t most_bytes);
   /// Valid until the next call; empty at the end. The last line may lack its line break.
   [[nodiscard]] std::string_view next_block();
+  /// Bytes, when it was opened.
+  [[nodiscard]] std::size_t size() const { return size_; }
 
  private:
   /// Appends what one call of read(2) gives; 0 at the end of the file.
@@ -48,7 +55,7 @@ class TextFile {
 
   Descriptor file_;
   std::size_t most_bytes_;
-  std::size_t read_ = 0;
+  std::size_t size_ = 0, read_ = 0;
   std::string bytes_;      ///< handed out, and the begin of the next line
   std::size_t given_ = 0;  ///< of them
 };

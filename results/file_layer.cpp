@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/descriptor.hpp"
+#include "base/ordered_work.hpp"
 #include "base/text.hpp"
 
 namespace kphi::results {
@@ -188,11 +189,22 @@ HashedText::HashedText(const std::filesystem::path& path, std::size_t most_bytes
     : path_(path), file_(reading(path, [&] { return TextFile(path, most_bytes); })) {}
 
 TextBlocks HashedText::blocks() {
-  return TextBlocks([this] {
-    const std::string_view block = reading(path_, [this] { return file_.next_block(); });
-    digest_.update(block);
-    return block;
-  });
+  return {[this] {
+            const std::string_view block = reading(path_, [this] { return file_.next_block(); });
+            hash(block);
+            return block;
+          },
+          file_.size()};
+}
+
+void HashedText::hash(std::string_view block) {
+  if (hashing_.valid()) hashing_.get();
+  hashing_ = std::async(launch_for(block.size()), [this, text = std::string(block)] { digest_.update(text); });
+}
+
+std::string HashedText::sha256() {
+  if (hashing_.valid()) hashing_.get();
+  return digest_.hex();
 }
 
 }  // namespace kphi::results

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -114,19 +115,23 @@ class Sha256 {
 /// Throws RecordError if the file cannot be read to its end.
 [[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
 
-/// A long text, read once, in blocks of whole lines. Throws RecordError as read_text does.
+/// A long text, read once, in blocks of whole lines, and hashed by a thread of its own. Throws RecordError as read_text
+/// does.
 class HashedText {
  public:
   HashedText(const std::filesystem::path& path, std::size_t most_bytes);
   /// Once; `this` must outlive it.
   [[nodiscard]] TextBlocks blocks();
   /// Of the blocks handed out; the last call.
-  [[nodiscard]] std::string sha256() { return digest_.hex(); }
+  [[nodiscard]] std::string sha256();
 
  private:
+  void hash(std::string_view block);
+
   std::filesystem::path path_;
   TextFile file_;
   Sha256 digest_;
+  std::future<void> hashing_;  ///< of the block before
 };
 
 }  // namespace kphi::results

@@ -5,16 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
-#include <future>
+#include <functional>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 #include <variant>
 
 #include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/ordered_work.hpp"
 
 namespace kphi::results {
 namespace {
@@ -185,29 +184,38 @@ void append_row(std::string& text, const StepMean& step, const Columns& columns)
   text.back() = '\n';
 }
 
-/// Hands the file over in pieces, which a thread per processor writes.
-void format_to(const StepSource& steps, const std::function<void(std::string_view)>& sink) {
+/// `work` on [begin, end) of `count` rows after the other; `take` gets what it gives, in order.
+template <class Result, class Work>
+void in_pieces(std::size_t count, const Work& work, const std::function<void(Result)>& take) {
   constexpr std::size_t kRows = 4096;
+  OrderedWork<Result> pieces(take);
+  for (std::size_t begin = 0; begin < count; begin += kRows)
+    pieces.add(count > kRows ? std::launch::async : std::launch::deferred,
+               [&work, begin, end = std::min(begin + kRows, count)] { return work(begin, end); });
+  pieces.finish();
+}
+
+/// Hands the file over in pieces.
+void format_to(const StepSource& steps, const std::function<void(std::string_view)>& sink) {
   Groups groups = kNoGroups;
-  for (std::size_t i = 0; i < steps.count; ++i) take_groups(steps.step(i), groups);
+  in_pieces<Groups>(
+      steps.count,
+      [&](std::size_t begin, std::size_t end) {
+        Groups of_piece{};
+        for (std::size_t i = begin; i < end; ++i) take_groups(steps.step(i), of_piece);
+        return of_piece;
+      },
+      [&](const Groups& of_piece) { std::ranges::transform(groups, of_piece, groups.begin(), std::logical_or()); });
   const Columns columns = columns_of(groups);
-  const auto piece = [&](std::size_t begin) {
-    std::string text;
-    for (std::size_t i = begin; i < std::min(begin + kRows, steps.count); ++i) append_row(text, steps.step(i), columns);
-    return text;
-  };
-  std::deque<std::future<std::string>> ahead;
-  const auto hand_over = [&] {
-    sink(ahead.front().get());
-    ahead.pop_front();
-  };
   sink(header_of(columns) + '\n');
-  const auto policy = steps.count > kRows ? std::launch::async : std::launch::deferred;
-  for (std::size_t begin = 0; begin < steps.count; begin += kRows) {
-    if (ahead.size() >= std::max(1u, std::thread::hardware_concurrency())) hand_over();
-    ahead.push_back(std::async(policy, piece, begin));
-  }
-  while (!ahead.empty()) hand_over();
+  in_pieces<std::string>(
+      steps.count,
+      [&](std::size_t begin, std::size_t end) {
+        std::string text;
+        for (std::size_t i = begin; i < end; ++i) append_row(text, steps.step(i), columns);
+        return text;
+      },
+      sink);
 }
 
 /// The columns that a header names, in its order. All but those of the groups must be there, none twice.

@@ -106,6 +106,7 @@ void audit_two_speeds(const StandLog& log, Findings& findings) {
 /// Above twice the target, or half as much again as the rows around it.
 void audit_spikes(const StandLog& log, SpeedSource source, Findings& findings) {
   constexpr std::size_t kAround = 2;
+  constexpr double kHigher = 1.5;
   const auto at = [&](std::size_t i) { return rpm_of(log.rows[i], source).value_or(0); };
   const bool series = log.rows.size() >= 50;
   double highest = 0;
@@ -114,8 +115,9 @@ void audit_spikes(const StandLog& log, SpeedSource source, Findings& findings) {
     const double target = log.rows[i].target_rpm.value_or(0);
     bool spike = target > 0 && at(i) > 2 * target;
     if (target <= 0 && series && i >= kAround && i + kAround < log.rows.size()) {
+      if (!(at(i) > kHigher * std::min({at(i - 2), at(i - 1), at(i + 1), at(i + 2)}))) continue;
       const double around = upper_median({at(i - 2), at(i - 1), at(i + 1), at(i + 2)});
-      spike = around > kTurningRpm && at(i) > 1.5 * around;
+      spike = around > kTurningRpm && at(i) > kHigher * around;
     }
     if (!spike) continue;
     spikes.push_back(&log.rows[i]);
@@ -266,24 +268,33 @@ void audit_frozen(const StandLog& log, Findings& findings) {
 /// The rows within 2 % of the speed at which the log stays longest: indexes into log.rows. Empty with fewer than 100 of
 /// them, or under a tenth of the rows that turn.
 std::vector<std::size_t> plateau(const StandLog& log, SpeedSource source) {
-  std::vector<double> speeds;
-  for (const StandRow& row : log.rows)
-    if (rpm_of(row, source).value_or(0) > 500) speeds.push_back(*rpm_of(row, source));
-  std::ranges::sort(speeds);
-  constexpr double kWide = 1.02 / 0.98;
-  std::size_t most = 0, best = 0;
-  for (std::size_t low = 0, high = 0; low < speeds.size(); ++low) {
-    while (high < speeds.size() && speeds[high] <= kWide * speeds[low]) ++high;
-    if (high - low > most) {
-      most = high - low;
-      best = low;
-    }
+  constexpr double kSlowest = 500, kParts = 1000;  // one in kParts of the speed is a class
+  constexpr std::ptrdiff_t kClasses = 40;          // as wide as ± 2 %
+  const auto class_of = [&](const StandRow& row) {
+    const double rpm = rpm_of(row, source).value_or(0);
+    return rpm > kSlowest ? static_cast<std::ptrdiff_t>(kParts * std::log(rpm / kSlowest)) : -1;
+  };
+  std::vector<std::size_t> counts(kClasses);
+  std::size_t turning = 0;
+  for (const StandRow& row : log.rows) {
+    const std::ptrdiff_t one = class_of(row);
+    if (one < 0) continue;
+    const auto place = static_cast<std::size_t>(one);
+    if (place >= counts.size()) counts.resize(place + 1);
+    ++counts[place];
+    ++turning;
+  }
+  std::size_t within = std::accumulate(counts.begin(), counts.begin() + kClasses, std::size_t{0}), most = within;
+  std::ptrdiff_t best = 0;
+  for (std::ptrdiff_t low = 1; low + kClasses <= std::ssize(counts); ++low) {
+    within += counts[static_cast<std::size_t>(low + kClasses - 1)] - counts[static_cast<std::size_t>(low - 1)];
+    if (within > most) most = within, best = low;
   }
   std::vector<std::size_t> rows;
-  if (most < kPlateauRows || most * 10 < speeds.size()) return rows;
+  if (most < kPlateauRows || most * 10 < turning) return rows;
   for (std::size_t i = 0; i < log.rows.size(); ++i) {
-    const double rpm = rpm_of(log.rows[i], source).value_or(0);
-    if (rpm >= speeds[best] && rpm <= kWide * speeds[best]) rows.push_back(i);
+    const std::ptrdiff_t one = class_of(log.rows[i]);
+    if (one >= best && one < best + kClasses) rows.push_back(i);
   }
   return rows;
 }
@@ -304,17 +315,21 @@ void audit_drift(const StandLog& log, SpeedSource source, const std::vector<std:
 }
 
 void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std::size_t>& rows, Findings& findings) {
-  std::vector<double> longest, stretch;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (i > 0 && rows[i] != rows[i - 1] + 1) stretch.clear();
-    stretch.push_back(local_k(log.rows[rows[i]], source));
-    if (stretch.size() > longest.size()) longest = stretch;
+  constexpr std::size_t kEnough = 30'000;  // for its time; each row meets each
+  std::size_t first = 0, longest = 0;
+  for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+    for (end = begin + 1; end < rows.size() && rows[end] == rows[end - 1] + 1;) ++end;
+    if (end - begin > longest) first = begin, longest = end - begin;
   }
-  const double time = longest.size() < kPlateauRows ? 1 : correlation_time(longest);
+  if (longest < kPlateauRows) return;
+  std::vector<double> stretch;
+  for (std::size_t i = first; i < first + std::min(longest, kEnough); ++i)
+    stretch.push_back(local_k(log.rows[rows[i]], source));
+  const double time = correlation_time(stretch);
   if (time < 2) return;
-  add(findings, FindingKind::correlated_noise, longest.size(), 0,
-      fmt::format("{} rows at constant speed count as {:.0f} independent ones: s/√n is {:.1f} times too small",
-                  longest.size(), static_cast<double>(longest.size()) / time, std::sqrt(time)));
+  add(findings, FindingKind::correlated_noise, longest, 0,
+      fmt::format("{} rows at constant speed count as {:.0f} independent ones: s/√n is {:.1f} times too small", longest,
+                  static_cast<double>(longest) / time, std::sqrt(time)));
 }
 
 }  // namespace

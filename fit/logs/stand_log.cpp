@@ -6,12 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <deque>
 #include <filesystem>
-#include <future>
-#include <thread>
 
 #include "base/error.hpp"
+#include "base/ordered_work.hpp"
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
 
@@ -28,8 +26,8 @@ struct UnitRow {
 
 constexpr double kPoundForce = 4.4482216152605;  // N, exactly (0.45359237 kg × 9.80665 m/s²)
 constexpr double kInch = 0.0254;                 // m, exactly
+constexpr std::size_t kMostRows = 40'000'000;    // 4 GB of memory
 constexpr double kGramForce = from_gram_force(1).value();
-constexpr std::size_t kWorthAThread = std::size_t{1} << 16;  // bytes of a block
 
 constexpr std::array kUnits{
     UnitRow{Measure::time, 1, {"s"}},
@@ -222,6 +220,7 @@ std::optional<double> number_in(const TableRow& fields, std::size_t column, bool
 
 /// What one block of a log gives.
 struct LogBlock {
+  std::size_t bytes = 0;
   std::vector<StandRow> rows;
   std::vector<TableProblem> problems, not_numbers;
 };
@@ -266,6 +265,7 @@ void append(StandLog& log, LogBlock block) {
 
 LogBlock read_block(const Table& begin, std::string_view text, std::size_t line, const RowFormat& format) {
   LogBlock block;
+  block.bytes = text.size();
   Table table = read_csv_rows(begin, text, line, format.separator, [&](const Table&, const TableRow& fields) {
     if (const auto row = read_row(fields, format, begin.path, block)) block.rows.push_back(*row);
   });
@@ -297,23 +297,23 @@ StandLog read_rows(TextBlocks text, std::string path, const CsvDialect& dialect,
                .thrust_unit = find(format.columns, kThrust)->unit,
                .has_electrical = find(format.columns, &StandRow::electrical_rpm) != nullptr,
                .has_optical = find(format.columns, &StandRow::optical_rpm) != nullptr};
-  std::deque<std::future<LogBlock>> ahead;
-  const auto take = [&] {
-    append(log, ahead.front().get());
-    ahead.pop_front();
-  };
+  OrderedWork<LogBlock> blocks([&](LogBlock block) {
+    if (log.rows.empty() && block.bytes > 0)
+      log.rows.reserve(std::min(kMostRows, block.rows.size() * (text.bytes() / block.bytes + 1)));
+    append(log, std::move(block));
+    if (log.rows.size() > kMostRows) {
+      throw ConfigurationError(
+          fmt::format("{}: more than {} million rows; import it in parts", log.path, kMostRows / 1'000'000));
+    }
+  });
   std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(head, '\n'));
   std::string_view block = text.front().substr(head.size());
-  do {
-    if (ahead.size() >= std::max(1u, std::thread::hardware_concurrency())) take();
-    ahead.push_back(std::async(
-        block.size() < kWorthAThread ? std::launch::deferred : std::launch::async,
-        [&begin, &format, line, text = std::string(block)] { return read_block(begin, text, line, format); }));
+  for (; !text.front().empty(); text.pop(), block = text.front()) {
+    blocks.add(launch_for(block.size()),
+               [&begin, &format, line, text = std::string(block)] { return read_block(begin, text, line, format); });
     line += static_cast<std::size_t>(std::ranges::count(block, '\n'));
-    text.pop();
-    block = text.front();
-  } while (!block.empty());
-  while (!ahead.empty()) take();
+  }
+  blocks.finish();
   return log;
 }
 

@@ -172,6 +172,24 @@ TEST(LogAudit, CountsIndependentRows) {
   EXPECT_EQ(correlation_time({1, 1, 1, 1}), 1);
 }
 
+TEST(LogAudit, CountsIndependentRowsOfALongLogByItsBegin) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 0.002);
+  StandLog log{.path = "log.csv", .thrust_unit = "N", .has_optical = true};
+  double memory = 0;
+  for (std::size_t i = 0; i < 200'000; ++i) {
+    memory = 0.9 * memory + noise(random);
+    StandRow row{.line = i + 2, .thrust_n = thrust_of(5000) + memory};
+    row.optical_rpm = 5000;
+    log.rows.push_back(row);
+  }
+  const auto findings = audit(log, {});
+  const auto found = std::ranges::find(findings, FindingKind::correlated_noise, &LogFinding::kind);
+  ASSERT_NE(found, findings.end());
+  EXPECT_EQ(found->rows, 200'000u);
+  EXPECT_THAT(found->text, HasSubstr("s/√n is 4.")) << "√19 of a first-order process";
+}
+
 TEST(LogAudit, TakesNoiseAtRestForNoNegativeThrust) {
   StandLog log = series();
   for (const LogFinding& finding : audit(log, {})) EXPECT_NE(finding.kind, FindingKind::negative_thrust);
