@@ -26,7 +26,7 @@ struct UnitRow {
 
 constexpr double kPoundForce = 4.4482216152605;  // N, exactly (0.45359237 kg × 9.80665 m/s²)
 constexpr double kInch = 0.0254;                 // m, exactly
-constexpr std::size_t kMostRows = 40'000'000;    // 4 GB of memory
+constexpr std::size_t kMostRows = 10'000'000;    // 2 GB of memory
 constexpr double kGramForce = from_gram_force(1).value();
 
 constexpr std::array kUnits{
@@ -300,11 +300,11 @@ StandLog read_rows(TextBlocks text, std::string path, const CsvDialect& dialect,
   OrderedWork<LogBlock> blocks([&](LogBlock block) {
     if (log.rows.empty() && block.bytes > 0)
       log.rows.reserve(std::min(kMostRows, block.rows.size() * (text.bytes() / block.bytes + 1)));
-    append(log, std::move(block));
-    if (log.rows.size() > kMostRows) {
+    if (log.rows.size() + block.rows.size() > kMostRows) {
       throw ConfigurationError(
           fmt::format("{}: more than {} million rows; import it in parts", log.path, kMostRows / 1'000'000));
     }
+    append(log, std::move(block));
   });
   std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(head, '\n'));
   std::string_view block = text.front().substr(head.size());
