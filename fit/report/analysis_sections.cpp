@@ -114,7 +114,7 @@ std::string test_section(const Analysis& analysis) {
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {
-  HtmlTable table({"φ", "change of k over the range, %", "±, %", "beyond noise, %"});
+  HtmlTable table({"φ", "change of k over the range, %", "u, %", "u of k at any speed, %"});
   for (const SpeedDependence& one : speed) {
     const double k = one.levels.empty() ? 0 : one.levels.back().k;
     table.row({html_angle(one.phi_deg), html_number(100 * one.change.value, "{:+.3f}"),

@@ -95,8 +95,9 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
 
 void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> speed) {
   ErrorSource source{"model T = k w^2", Evaluation::type_a, kUnitOfK,
-                     "deviation of k between speeds beyond noise, where the test finds it"};
-  for (const SpeedDependence& one : speed) source.effects.push_back({one.inadequacy, 1});
+                     "where a test finds that k depends on speed: of k at any speed of the range", true};
+  for (const SpeedDependence& one : speed)
+    source.effects.push_back({one.inadequacy, one.change.value < 0 ? -1.0 : 1.0});
   if (!speed.empty()) sources.sources.push_back(std::move(source));
 }
 

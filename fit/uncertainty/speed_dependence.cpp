@@ -282,6 +282,19 @@ double inadequacy_of(const std::vector<Run>& complete) {
   return std::sqrt(std::max(0.0, excess / xx * (complete.size() > 1 ? 1 : n / (n - 1))));
 }
 
+/// Rms of the trend's line about the k of the runs, every speed from the slowest to the fastest as likely. The k of a
+/// run weighs its steps in ω⁴, so that it belongs to a high speed, and a slow rotor is far from it.
+double spread_of_trend(const Angle& angle, double slowest, double fastest, double change) {
+  double offset = 0, xx = 0;  // of that speed from the middle, as a share of the range
+  for (const Run& run : angle.runs) {
+    for (const Sample& sample : run.samples) {
+      offset += sample.x * sample.x * ((sample.speed - slowest) / (fastest - slowest) - 0.5);
+      xx += sample.x * sample.x;
+    }
+  }
+  return std::abs(change) * angle.k * std::sqrt(1.0 / 12 + std::pow(offset / xx, 2));
+}
+
 std::vector<SpeedCoefficient> level_coefficients(const std::vector<Run>& runs) {
   std::map<int, std::vector<Point>> levels;
   for (const Run& run : runs)
@@ -358,6 +371,10 @@ std::vector<SpeedDependence> speed_dependence(std::span<const OcclusionCoefficie
     judge(angles[i], scatter, zero_movement, freedom, found);
     if (found.depends() && !angles[i].complete.front().samples.empty())
       found.inadequacy = inadequacy_of(angles[i].complete);
+    if (found.trend.p < kTestLevel / 2)
+      found.inadequacy =
+          std::max(found.inadequacy, spread_of_trend(angles[i], found.levels.front().speed_rad_s,
+                                                     found.levels.back().speed_rad_s, found.change.value));
     found.lack_of_fit.statistic = "F";
     found.lack_of_fit.name = fmt::format("lack of fit of T = k w^2 at phi = {} deg", found.phi_deg);
     found.lack_of_fit.hypothesis = found.trend.hypothesis = "k does not depend on the speed";

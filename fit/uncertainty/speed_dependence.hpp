@@ -31,8 +31,9 @@ struct SpeedDependence {
   HypothesisTest trend;  ///< change = 0
   /// Either test at half the level, so that both together reject a true T = k ω² once in twenty.
   [[nodiscard]] bool depends() const { return lack_of_fit.p < kTestLevel / 2 || trend.p < kTestLevel / 2; }
-  /// Rms deviation of the levels' k from the k of the range, weighted in ω⁴, beyond what noise explains, where k
-  /// depends on the speed; of a single repetition with its noise. N/(rad/s)².
+  /// Where k depends on the speed, by how much the k at any speed of the range is off: the rms deviation of the levels'
+  /// k, weighted in ω⁴, beyond what noise explains (of a single repetition with its noise), or, if larger, that of the
+  /// straight line with all speeds as likely. N/(rad/s)².
   double inadequacy = 0;
 };
 
