@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <bit>
@@ -18,6 +19,11 @@ constexpr hsize_t kComponents = 6;   // of counts
 constexpr hsize_t kManyRows = 4096;  // from here on it pays to look how chunks lie in the file
 
 static_assert(std::endian::native == std::endian::little, "chunks are written as they lie in memory");
+
+/// Of the bytes behind those with the CRC `before`.
+std::uint32_t crc_32(std::uint32_t before, const std::byte* bytes, std::size_t n) {
+  return static_cast<std::uint32_t>(::crc32_z(before, reinterpret_cast<const Bytef*>(bytes), n));
+}
 
 struct Cause {
   std::string text;
@@ -271,7 +277,7 @@ void Column::append(const void* rows, std::size_t count) {
     const std::size_t filled = rows_ % chunk_rows_;
     const std::size_t n = std::min<std::size_t>(count, chunk_rows_ - filled);
     std::memcpy(chunk_.data() + filled * row_bytes_, from, n * row_bytes_);
-    crc_.process_bytes(from, n * row_bytes_);
+    crc_ = crc_32(crc_, from, n * row_bytes_);
     rows_ += n;
     from += n * row_bytes_;
     count -= n;
@@ -354,13 +360,13 @@ void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
 std::uint32_t ColumnReader::crc() {
   const std::uint64_t block = std::min<std::uint64_t>(65536, rows_);
   std::vector<std::byte> rows(block * row_bytes_);
-  boost::crc_32_type crc;
+  std::uint32_t crc = 0;
   for (std::uint64_t at = 0; at < rows_; at += block) {
     const std::uint64_t n = std::min(block, rows_ - at);
     read(at, n, rows.data());
-    crc.process_bytes(rows.data(), n * row_bytes_);
+    crc = crc_32(crc, rows.data(), n * row_bytes_);
   }
-  return crc.checksum();
+  return crc;
 }
 
 void make_scale(const Handle& scale, const char* name, const std::vector<ScaleUse>& uses) {

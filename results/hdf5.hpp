@@ -5,7 +5,6 @@
 
 #include <hdf5.h>
 
-#include <boost/crc.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -85,7 +84,7 @@ class Column {
   /// Rows appended so far.
   [[nodiscard]] std::uint64_t rows() const { return rows_; }
   /// CRC-32 of all rows appended so far.
-  [[nodiscard]] std::uint32_t crc() const { return crc_.checksum(); }
+  [[nodiscard]] std::uint32_t crc() const { return crc_; }
   /// Notes the CRC of all rows in the attribute `crc32`.
   void write_crc();
   [[nodiscard]] const Handle& dataset() const { return dataset_; }
@@ -100,7 +99,7 @@ class Column {
   std::vector<std::byte> chunk_;
   std::uint64_t rows_ = 0;
   std::uint64_t written_ = 0;
-  boost::crc_32_type crc_;
+  std::uint32_t crc_ = 0;
 };
 
 /// A dataset read in blocks of rows.
