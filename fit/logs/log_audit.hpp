@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "fit/logs/stand_log.hpp"
+#include "fit/logs/row_selection.hpp"
 
 namespace kphi::fit {
 
