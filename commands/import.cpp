@@ -7,6 +7,7 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "fit/logs/import_table.hpp"
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/steps_csv.hpp"
 #include "results/version.hpp"

@@ -6,7 +6,7 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "results/campaign_folder.hpp"
-#include "results/file_layer.hpp"
+#include "results/digest.hpp"
 #include "results/run_layout.hpp"
 #include "results/run_reader.hpp"
 
@@ -119,7 +119,7 @@ std::vector<std::string> problems_of_coefficients(const CampaignFolder& folder) 
     const CampaignState state = state_of(read_journal(folder.journal()));
     for (const auto& run : load_sealed_coefficients(path).provenance.runs) {
       const auto accepted = std::ranges::find(state.accepted, run.file, &AcceptedRun::file);
-      if (accepted == state.accepted.end() || accepted->sha256 != run.sha256)
+      if (accepted == state.accepted.end() || accepted->digests.sha256 != run.sha256)
         problems.push_back(path + ": fitted from another " + run.file + " than the journal's; fit again");
     }
   } catch (const std::runtime_error& error) {

@@ -13,6 +13,7 @@
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/steps_csv.hpp"

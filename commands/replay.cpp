@@ -36,7 +36,9 @@ struct ReplayRequest {
 };
 
 struct Replay {
+  explicit Replay(std::vector<StepMean> again) : steps(std::move(again)), table(results::format_steps(steps)) {}
   std::vector<StepMean> steps;
+  std::string table;                            ///< of the steps
   std::optional<std::filesystem::path> stored;  ///< the campaign's table that should hold them, if there is one
   std::optional<std::string> difference;        ///< of that table, or of another one of the campaign
 };
@@ -44,13 +46,10 @@ struct Replay {
 /// Steps in the order of the files; a thread per processor. Throws DataRejected for a run that was changed.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   std::vector<std::packaged_task<std::vector<StepMean>(results::LoadCellColumns&)>> tasks;
-  std::map<std::string, std::string> digests;
+  std::map<std::string, results::RunDigests> digests;
   if (!runs.empty()) digests = results::digests_beside(runs.front());
   for (const auto& run : runs) {
-    tasks.emplace_back([&](auto& cell) {
-      results::require_unchanged_run(run, digests);
-      return reduce(results::read_run(run, cell), cell);
-    });
+    tasks.emplace_back([&](auto& cell) { return reduce(results::read_unchanged_run(run, digests, cell), cell); });
   }
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {
@@ -110,10 +109,10 @@ Replay replay_campaign(const CampaignFolder& folder) {
   std::vector<double> order;
   if (const auto file = folder.campaign_file(); std::filesystem::exists(file))
     order = profiles::load_campaign(file.string()).occlusions_deg;
-  Replay replay{reduced(folder.complete_runs(order)), std::nullopt, std::nullopt};
+  Replay replay(reduced(folder.complete_runs(order)));
   if (!std::filesystem::exists(folder.steps())) return replay;
   replay.stored = folder.steps();
-  replay.difference = difference(results::format_steps(replay.steps), results::read_text(folder.steps()));
+  replay.difference = difference(replay.table, results::read_text(folder.steps()));
   if (!replay.difference && is_unlike(folder.means(), means_of(replay.steps)))
     replay.difference = "agrees, but means.csv beside it is not its average over the repetitions";
   if (!replay.difference && is_unlike(folder.references(), reduced(folder.reference_runs())))
@@ -122,14 +121,13 @@ Replay replay_campaign(const CampaignFolder& folder) {
 }
 
 Replay replay_run(const std::filesystem::path& path) {
-  Replay replay{reduced(std::span(&path, 1)), std::nullopt, std::nullopt};
+  Replay replay(reduced(std::span(&path, 1)));
   const auto runs = std::filesystem::absolute(path).parent_path();
   if (replay.steps.empty() || runs.filename() != "runs") return replay;
   const auto table = runs.parent_path() / (replay.steps.front().repetition < 0 ? "references.csv" : "steps.csv");
   if (!std::filesystem::exists(table)) return replay;
   replay.stored = table;
-  const std::string again = results::format_steps(replay.steps);
-  replay.difference = difference(again, results::read_text(table), opening_of(again));
+  replay.difference = difference(replay.table, results::read_text(table), opening_of(replay.table));
   return replay;
 }
 
@@ -143,7 +141,7 @@ Json to_json(const StepMean& step) {
 }
 
 void print(const Replay& replay, bool json) {
-  if (!json) return fmt::print("{}", results::format_steps(replay.steps));
+  if (!json) return fmt::print("{}", replay.table);
   Json steps = Json::array();
   for (const StepMean& step : replay.steps) steps.push_back(to_json(step));
   print_json({{"steps", steps},

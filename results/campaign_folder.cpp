@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "results/checksums.hpp"
+#include "results/digest.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::results {
@@ -120,6 +121,10 @@ void check_files(const CampaignFolder& folder, const std::map<std::string, std::
   for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, problems);
 }
 
+DataRejected changed_run(const std::string& problem) {
+  return DataRejected(problem + "; restore it from a copy, or repeat the run");
+}
+
 /// Copying or version control may have made it writable; the SHA-256 shows whether anybody changed it.
 bool is_writable(const std::filesystem::path& path) {
   using std::filesystem::perms;
@@ -188,36 +193,53 @@ CampaignState state_of(const JournalReading& journal) {
     }
     state.finished = entry.event == kCampaignFinished;
     if (entry.event != kRunAccepted) continue;
-    AcceptedRun run{text(entry, "file"), text(entry, "sha256"), entry.time_ns};
-    if (!run.file.empty() && !run.sha256.empty()) state.accepted.push_back(std::move(run));
+    AcceptedRun run{text(entry, "file"), {text(entry, "sha256"), text(entry, "contents_xxh128")}, entry.time_ns};
+    if (!run.file.empty() && !run.digests.sha256.empty()) state.accepted.push_back(std::move(run));
   }
   return state;
 }
 
 std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state) {
   std::vector<std::string> problems;
-  for (const AcceptedRun& run : state.accepted) check_file(folder.path() / run.file, run.sha256, problems);
+  for (const AcceptedRun& run : state.accepted) check_file(folder.path() / run.file, run.digests.sha256, problems);
   return problems;
 }
 
-std::map<std::string, std::string> digests_beside(const std::filesystem::path& run) {
-  std::map<std::string, std::string> digests;
+std::map<std::string, RunDigests> digests_beside(const std::filesystem::path& run) {
+  std::map<std::string, RunDigests> digests;
   const std::filesystem::path runs = std::filesystem::absolute(run).parent_path();
   const std::filesystem::path journal = runs.parent_path() / "journal.jsonl";
   if (runs.filename() != "runs" || !std::filesystem::exists(journal)) return digests;
   for (const AcceptedRun& accepted : state_of(read_journal(journal)).accepted)
-    digests[std::filesystem::path(accepted.file).filename().string()] = accepted.sha256;
+    digests[std::filesystem::path(accepted.file).filename().string()] = accepted.digests;
   return digests;
 }
 
-void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, std::string>& digests) {
+void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, RunDigests>& digests) {
   std::vector<std::string> problems;
   if (const auto known = digests.find(run.filename().string()); known != digests.end())
-    check_file(run, known->second, problems);
+    check_file(run, known->second.sha256, problems);
   else if (run.extension() == ".h5")
     problems = verify_run(run).problems;
-  if (!problems.empty())
-    throw DataRejected(with_file(run, problems.front()) + "; restore it from a copy, or repeat the run");
+  if (!problems.empty()) throw changed_run(with_file(run, problems.front()));
+}
+
+RunRecording read_unchanged_run(const std::filesystem::path& run, const std::map<std::string, RunDigests>& digests,
+                                LoadCellColumns& cell) {
+  const auto known = digests.find(run.filename().string());
+  if (known == digests.end() || known->second.contents_xxh128.empty()) {
+    require_unchanged_run(run, digests);
+    return read_run(run, cell);
+  }
+  try {
+    RunRecording recording = read_run(run, cell);
+    if (recording.contents_xxh128 == known->second.contents_xxh128) return recording;
+  } catch (const RecordError&) {  // whether it was changed is the better message
+    require_unchanged_run(run, digests);
+    throw;
+  }
+  require_unchanged_run(run, digests);
+  throw changed_run(run.string() + ": its SHA-256 matches the journal, but contents_xxh128 does not");
 }
 
 std::vector<std::string> set_leftovers_aside(const CampaignFolder& folder, const CampaignState& state,

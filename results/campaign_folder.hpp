@@ -12,6 +12,8 @@
 
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
+#include "results/load_cell_columns.hpp"
+#include "results/records.hpp"
 
 namespace kphi::results {
 
@@ -65,7 +67,7 @@ class CampaignFolder {
 
 struct AcceptedRun {
   std::string file;  ///< relative to the campaign's folder
-  std::string sha256;
+  RunDigests digests;
   Nanoseconds time_ns = 0;  ///< bench time of its acceptance
 };
 
@@ -83,11 +85,15 @@ struct CampaignState {
 /// Compares the SHA-256 of every accepted run; one line for each that is missing or changed.
 [[nodiscard]] std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state);
 
-/// File name → SHA-256 of the accepted runs of the campaign in whose runs/ this file lies; empty: no journal there.
-[[nodiscard]] std::map<std::string, std::string> digests_beside(const std::filesystem::path& run);
-/// Throws DataRejected if the run is not as it was written: by these digests, or, if they do not name it, by the
-/// checksums in the file itself.
-void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, std::string>& digests);
+/// File name → digests of the accepted runs of the campaign in whose runs/ this file lies; empty: no journal there.
+[[nodiscard]] std::map<std::string, RunDigests> digests_beside(const std::filesystem::path& run);
+/// Throws DataRejected if the run is not as it was written: by the SHA-256 among these digests, or, if they do not name
+/// it, by the checksums in the file itself.
+void require_unchanged_run(const std::filesystem::path& run, const std::map<std::string, RunDigests>& digests);
+/// read_run() of a run that is as it was written: by the digest of what is read, if the journal knows it, or as
+/// require_unchanged_run().
+[[nodiscard]] RunRecording read_unchanged_run(const std::filesystem::path& run,
+                                              const std::map<std::string, RunDigests>& digests, LoadCellColumns& cell);
 
 /// Renames the unaccepted files of a killed program in runs/, never over another file: `.h5.part` to
 /// `.interrupted.h5.part`, a complete file that is not in the journal to `.unaccepted.h5`. Returns the new names,

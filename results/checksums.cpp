@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "base/error.hpp"
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 
 namespace kphi::results {

@@ -2,18 +2,12 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <openssl/evp.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <cstdio>
-#include <memory>
-#include <vector>
 
 #include "base/descriptor.hpp"
-#include "base/ordered_work.hpp"
 #include "base/text.hpp"
 
 namespace kphi::results {
@@ -26,20 +20,6 @@ Descriptor opened(const std::filesystem::path& path, int flags, const char* oper
   Descriptor file(::open(path.empty() ? "." : path.c_str(), flags | O_CLOEXEC, 0666));
   if (file.number() < 0) fail(operation);
   return file;
-}
-
-void check(bool ok) {
-  if (!ok) throw RecordError("OpenSSL: SHA-256 is not available; check the OpenSSL configuration");
-}
-
-/// What a text file refuses becomes a RecordError that names it.
-template <class Read>
-auto reading(const std::filesystem::path& path, Read read) {
-  try {
-    return read();
-  } catch (const std::runtime_error& error) {
-    throw RecordError(fmt::format("{}: {}", path.string(), error.what()));
-  }
 }
 
 }  // namespace
@@ -152,59 +132,6 @@ std::string failure_text(const std::string& where, int error) {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
   return fmt::format("{}{}: {}{}", full ? "disk full: " : "", where, std::generic_category().message(error),
                      full ? "; make room or choose another folder" : "");
-}
-
-Sha256::Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
-  check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
-}
-
-void Sha256::update(std::string_view bytes) {
-  check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1);
-}
-
-std::string Sha256::hex() {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
-  unsigned size = 0;
-  check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
-  return fmt::format("{:02x}", fmt::join(raw.begin(), raw.begin() + size, ""));
-}
-
-std::string sha256(std::string_view bytes) {
-  Sha256 digest;
-  digest.update(bytes);
-  return digest.hex();
-}
-
-std::string sha256_of_file(const std::filesystem::path& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-  if (!file) throw RecordError(failure_text(path.string(), errno));
-  Sha256 digest;
-  std::vector<char> block(1 << 18);
-  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update({block.data(), n});
-  if (std::ferror(file.get())) throw RecordError(failure_text(path.string(), errno));
-  return digest.hex();
-}
-
-HashedText::HashedText(const std::filesystem::path& path, std::size_t most_bytes)
-    : path_(path), file_(reading(path, [&] { return TextFile(path, most_bytes); })) {}
-
-TextBlocks HashedText::blocks() {
-  return {[this] {
-            const std::string_view block = reading(path_, [this] { return file_.next_block(); });
-            hash(block);
-            return block;
-          },
-          file_.size()};
-}
-
-void HashedText::hash(std::string_view block) {
-  if (hashing_.valid()) hashing_.get();
-  hashing_ = std::async(launch_for(block.size()), [this, text = std::string(block)] { digest_.update(text); });
-}
-
-std::string HashedText::sha256() {
-  if (hashing_.valid()) hashing_.get();
-  return digest_.hex();
 }
 
 }  // namespace kphi::results

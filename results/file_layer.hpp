@@ -1,11 +1,10 @@
 // File operations of a record that a disk may refuse: reserve, sync, rename. Tests pass a layer that refuses, the
-// deterministic bench one that does not wait for the disk. Beside it, text files and SHA-256.
+// deterministic bench one that does not wait for the disk. Beside it, text files.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
-#include <future>
-#include <memory>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -13,8 +12,6 @@
 #include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/text.hpp"
-
-struct evp_md_ctx_st;
 
 namespace kphi::results {
 
@@ -61,6 +58,16 @@ auto on_disk(const std::string& where, Action&& action) {
   }
 }
 
+/// Runs `read`; what a text file refuses (base/text.hpp) becomes a RecordError that names it.
+template <class Read>
+auto reading(const std::filesystem::path& path, Read&& read) {
+  try {
+    return read();
+  } catch (const std::runtime_error& error) {
+    throw RecordError(path.string() + ": " + error.what());
+  }
+}
+
 /// Throws RecordError unless `folder` has room for `bytes`; the message names both and the folder.
 void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files = disk());
 
@@ -99,39 +106,5 @@ inline constexpr std::size_t kLargestTable = std::size_t{64} << 20, kLargestLog 
 
 /// The file's bytes, `most_bytes` at most. Throws RecordError for a longer file, a pipe, a device or a folder.
 [[nodiscard]] std::string read_text(const std::filesystem::path& path, std::size_t most_bytes = kLargestTable);
-
-class Sha256 {
- public:
-  Sha256();
-  void update(std::string_view bytes);
-  /// 64 lower-case hex digits; the last call.
-  [[nodiscard]] std::string hex();
-
- private:
-  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;
-};
-
-[[nodiscard]] std::string sha256(std::string_view bytes);
-/// Throws RecordError if the file cannot be read to its end.
-[[nodiscard]] std::string sha256_of_file(const std::filesystem::path& path);
-
-/// A long text, read once, in blocks of whole lines, and hashed by a thread of its own. Throws RecordError as read_text
-/// does.
-class HashedText {
- public:
-  HashedText(const std::filesystem::path& path, std::size_t most_bytes);
-  /// Once; `this` must outlive it.
-  [[nodiscard]] TextBlocks blocks();
-  /// Of the blocks handed out; the last call.
-  [[nodiscard]] std::string sha256();
-
- private:
-  void hash(std::string_view block);
-
-  std::filesystem::path path_;
-  TextFile file_;
-  Sha256 digest_;
-  std::future<void> hashing_;  ///< of the block before
-};
 
 }  // namespace kphi::results

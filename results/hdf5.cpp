@@ -322,7 +322,7 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored,
       H5Tequal(type.get(), type_.get()) > 0 && H5Pget_chunk(list.get(), 2, chunk.data()) == rank && chunk[1] == width &&
       rows_ <= H5Dget_storage_size(dataset_.get()) / row_bytes_) {
     chunk_rows_ = chunk[0];
-    for (hsize_t first = 0; first + chunk_rows_ <= rows_; first += chunk_rows_) {
+    for (hsize_t first = 0; first < rows_; first += chunk_rows_) {
       const std::array<hsize_t, 2> offset{first, 0};
       haddr_t& at = chunks_.emplace_back(HADDR_UNDEF);
       check(H5Dget_chunk_info_by_coord(dataset_.get(), offset.data(), nullptr, &at, nullptr), doing_);
@@ -332,19 +332,28 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored,
 }
 
 void ColumnReader::read(std::uint64_t first, std::uint64_t count, void* rows) {
+  fetch(first, count, rows);
+  if (digest_) digest_->update({static_cast<const char*>(rows), count * row_bytes_});
+}
+
+void ColumnReader::fetch(std::uint64_t first, std::uint64_t count, void* rows) {
   if (count == 0) return;
   if (first + count > rows_) throw RecordError(doing_ + ": holds fewer rows than asked for");
   auto* to = static_cast<std::byte*>(rows);
-  // Whole chunks, without HDF5: it has one lock, for which threads would wait at each chunk.
-  for (; !chunks_.empty() && first % chunk_rows_ == 0 && count >= chunk_rows_; first += chunk_rows_) {
-    const std::size_t bytes = chunk_rows_ * row_bytes_;
-    const auto at = static_cast<off_t>(chunks_[first / chunk_rows_]);
-    if (::pread(descriptor_, to, bytes, at) != static_cast<ssize_t>(bytes))
-      throw RecordError(doing_ + ": the file ends, or cannot be read, inside a chunk");
-    to += bytes;
-    count -= chunk_rows_;
+  if (!chunks_.empty()) {
+    // Without HDF5: it has one lock, for which threads would wait at each chunk.
+    while (count > 0) {
+      const std::uint64_t inside = first % chunk_rows_, n = std::min(count, chunk_rows_ - inside);
+      const std::size_t bytes = n * row_bytes_;
+      const auto at = static_cast<off_t>(chunks_[first / chunk_rows_] + inside * row_bytes_);
+      if (::pread(descriptor_, to, bytes, at) != static_cast<ssize_t>(bytes))
+        throw RecordError(doing_ + ": the file ends, or cannot be read, inside a chunk");
+      to += bytes;
+      first += n;
+      count -= n;
+    }
+    return;
   }
-  if (count == 0) return;
   if (first == 0 && count == rows_) {  // without the cost of a selection
     check(H5Dread(dataset_.get(), type_.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, to), doing_);
     return;

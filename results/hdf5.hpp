@@ -8,10 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/run_layout.hpp"
 
@@ -108,11 +110,16 @@ class ColumnReader {
   ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file);
   [[nodiscard]] std::uint64_t rows() const { return rows_; }
   void read(std::uint64_t first, std::uint64_t count, void* rows);
+  /// From now on the rows that are read, in their order, are digested.
+  void begin_digest() { digest_.emplace(); }
+  /// XXH128 of the rows read since.
+  [[nodiscard]] std::string digest() const { return digest_.value().hex(); }
   /// CRC-32 of all rows.
   [[nodiscard]] std::uint32_t crc();
   [[nodiscard]] const Handle& dataset() const { return dataset_; }
 
  private:
+  void fetch(std::uint64_t first, std::uint64_t count, void* rows);
   std::string doing_;
   Handle type_;  ///< of a value in memory
   std::size_t row_bytes_;
@@ -121,8 +128,9 @@ class ColumnReader {
   std::uint64_t rows_ = 0;
   std::vector<hsize_t> dims_;
   std::uint64_t chunk_rows_ = 0;
-  std::vector<haddr_t> chunks_;  ///< where the whole ones lie in the file, if they lie there as in memory
+  std::vector<haddr_t> chunks_;  ///< where they lie in the file, if they lie there as in memory
   int descriptor_ = -1;
+  std::optional<Xxh128> digest_;
 };
 
 /// Makes `scale` the dimension scale of dimension `dimension` of each of `datasets` (HDF5 Dimension Scale

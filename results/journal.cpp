@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "results/digest.hpp"
 
 namespace kphi::results {
 namespace {

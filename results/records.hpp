@@ -137,6 +137,13 @@ struct RunRecording : RunEnding {
   std::vector<SupplyReading> supply;  ///< by time
   std::vector<PhaseMark> phases;
   std::vector<StreamEvent> events;  ///< in the order in which they were noticed
+  std::string contents_xxh128;      ///< of what the quick read_run() reads; empty: read otherwise, or never ended
+};
+
+/// How a run is known again.
+struct RunDigests {
+  std::string sha256;           ///< of its file
+  std::string contents_xxh128;  ///< of what a reduction reads of it; empty in the journals of older versions
 };
 
 /// A row of the group /plot.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "results/digest.hpp"
 #include "results/hdf5.hpp"
 #include "results/run_layout.hpp"
 
@@ -21,6 +23,11 @@ using hdf5::ColumnReader;
 using hdf5::Handle;
 
 constexpr std::uint64_t kBlock = 8192;  // rows: the blocks of five columns stay in the second-level cache
+
+/// What a reduction reads of the samples: all but rdt_sequence.
+constexpr std::array kReduced{layout::kLoadCell[0], layout::kLoadCell[2], layout::kLoadCell[3], layout::kLoadCell[4]};
+constexpr RunGroup<LoadCellRecord> kReducedGroup{kLoadCellGroup.name, kLoadCellGroup.long_name,
+                                                 kLoadCellGroup.chunk_rows, kLoadCellGroup.time, kReduced};
 
 void require_format(const Handle& root, const std::filesystem::path& path) {
   std::string format;
@@ -69,10 +76,48 @@ void check_codes(const RunGroup<Row>& layout, const RunColumn<Row>& column, std:
   }
 }
 
+std::string_view bytes_of_value(const std::string& text) { return text; }
+template <class Number>
+std::string_view bytes_of_value(const Number& numbers) {
+  return {reinterpret_cast<const char*>(&numbers), sizeof numbers};
+}
+
+/// Digests of the columns that were read, if anybody asks for them.
+class Contents {
+ public:
+  template <class Row>
+  void begin(GroupReader<Row>& group) {
+    for (ColumnReader& column : group.columns) column.begin_digest();
+  }
+  template <class Row>
+  void add(const GroupReader<Row>& group) {
+    for (std::size_t i = 0; i < group.columns.size(); ++i)
+      lines_ += fmt::format("{}/{} {}\n", group.layout.name, group.layout.columns[i].name, group.columns[i].digest());
+  }
+  /// With the attributes of a run that has ended.
+  [[nodiscard]] std::string xxh128(const RunRecording& run) const {
+    Xxh128 attributes;
+    const auto add = [&](const char* name, const auto& value) {
+      attributes.update(name);
+      attributes.update(bytes_of_value(value));
+    };
+    for_each_attribute(run.header, add);
+    for_each_figure(run, add);
+    add("outcome", std::string(outcome_name(run.outcome)));
+    add("outcome_reason", run.outcome_reason);
+    return results::xxh128(lines_ + "attributes " + attributes.hex() + "\n");
+  }
+
+ private:
+  std::string lines_;
+};
+
 /// Behind those that are there.
 template <class Row>
-void append_rows(std::vector<Row>& rows, const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
+void append_rows(std::vector<Row>& rows, const Handle& parent, const RunGroup<Row>& layout, const std::string& file,
+                 Contents* contents) {
   GroupReader<Row> group(parent, layout, file);
+  if (contents != nullptr) contents->begin(group);
   const std::size_t first = rows.size();
   rows.resize(first + group.rows);
   std::vector<std::byte> bytes;
@@ -86,21 +131,23 @@ void append_rows(std::vector<Row>& rows, const Handle& parent, const RunGroup<Ro
       column.unpack(bytes.data(), std::span(rows).subspan(first + at, n));
     }
   }
+  if (contents != nullptr) contents->add(group);
 }
 
 template <class Row>
-std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file) {
+std::vector<Row> rows_of(const Handle& parent, const RunGroup<Row>& layout, const std::string& file,
+                         Contents* contents = nullptr) {
   std::vector<Row> rows;
-  append_rows(rows, parent, layout, file);
+  append_rows(rows, parent, layout, file, contents);
   return rows;
 }
 
-std::vector<MotorReading> motor_of(const Handle& root, const std::string& file) {
+std::vector<MotorReading> motor_of(const Handle& root, const std::string& file, Contents* contents) {
   const Handle motor = hdf5::open_group(root, "motor");
   std::vector<MotorReading> readings;
   for (const MotorChannelInfo& info : kMotorChannels) {
     const std::size_t before = readings.size();
-    append_rows(readings, motor, motor_group(info), file);
+    append_rows(readings, motor, motor_group(info), file, contents);
     const auto rows = std::span(readings).subspan(before);
     const auto earlier = [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; };
     if (!std::ranges::is_sorted(rows, earlier)) std::ranges::stable_sort(rows, earlier);
@@ -123,14 +170,14 @@ void read_outcome(const Handle& root, RunRecording& run) {
   run.outcome = complete == 1 ? Outcome::complete : Outcome::aborted;
 }
 
-RunRecording all_but_samples(const Handle& root, const std::filesystem::path& path) {
+RunRecording all_but_samples(const Handle& root, const std::filesystem::path& path, Contents* contents = nullptr) {
   const std::string file = path.string();
   RunRecording run;
   run.header = header_of(root, path);
-  run.motor = motor_of(root, file);
-  run.phases = rows_of(root, kCommandGroup, file);
-  run.events = rows_of(root, kEventGroup, file);
-  run.supply = rows_of(root, kSupplyGroup, file);
+  run.motor = motor_of(root, file, contents);
+  run.phases = rows_of(root, kCommandGroup, file, contents);
+  run.events = rows_of(root, kEventGroup, file, contents);
+  run.supply = rows_of(root, kSupplyGroup, file, contents);
   read_outcome(root, run);
   return run;
 }
@@ -294,12 +341,13 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
     static std::mutex asking;  // threads that all ask HDF5 wake each other at each of its calls
     std::unique_lock one_at_a_time(asking);
     const Handle root = hdf5::open_file(path);
-    RunRecording run = all_but_samples(root, path);
-    GroupReader<LoadCellRecord> group(root, kLoadCellGroup, path.string());
+    Contents contents;
+    RunRecording run = all_but_samples(root, path, &contents);
+    GroupReader<LoadCellRecord> group(root, kReducedGroup, path.string());
+    contents.begin(group);
     const bool ended = has_ending(root);
     one_at_a_time.unlock();
     cell.reset(group.rows);
-    group.columns[2].read(0, group.rows, cell.ft_sequence.data());
     std::vector<LoadCellColumns::Counts> counts;
     std::vector<std::uint32_t> status;
     std::vector<Nanoseconds> arrival_ns;
@@ -308,10 +356,13 @@ RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell) 
       status.resize(counts.size());
       arrival_ns.resize(counts.size());
       group.columns[0].read(at, counts.size(), counts.data());
-      group.columns[3].read(at, counts.size(), status.data());
-      group.columns[4].read(at, counts.size(), arrival_ns.data());
+      group.columns[1].read(at, counts.size(), cell.ft_sequence.data() + at);
+      group.columns[2].read(at, counts.size(), status.data());
+      group.columns[3].read(at, counts.size(), arrival_ns.data());
       cell.take(at, counts, status, arrival_ns, run.header);
     }
+    contents.add(group);
+    if (ended) run.contents_xxh128 = contents.xxh128(run);
     if (!ended) run.account = account_of(cell.ft_sequence, run.header.load_cell.ft_stride, std::identity());
     one_at_a_time.lock();  // closing asks HDF5, too
     return run;

@@ -15,7 +15,9 @@ namespace kphi::results {
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path);
 
 /// As read_run(), but quicker, with the load-cell records as columns in `cell`, whose memory is used again;
-/// `run.load_cell` stays empty.
+/// `run.load_cell` stays empty. Sets contents_xxh128: XXH128 of the lines "<group>/<column> <XXH128 of its rows>" of
+/// all columns that it reads, in this order (motor, command, events, supply, load_cell without rdt_sequence), and of a
+/// last line "attributes <XXH128 of their names and values>".
 [[nodiscard]] RunRecording read_run(const std::filesystem::path& path, LoadCellColumns& cell);
 
 /// Gaps and restarts in a stream of records, by its sequence numbers.

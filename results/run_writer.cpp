@@ -245,7 +245,7 @@ void RunWriter::add(const RunViews& views) {
   hdf5::write_attribute(plot.group(), "axes", std::string(kPlotGroup.time));
 }
 
-std::string RunWriter::finish(const RunEnding& ending, const Views& views) {
+RunDigests RunWriter::finish(const RunEnding& ending, const Views& views) {
   guarded([&] {
     if (views) {
       secure([] {});
@@ -271,7 +271,8 @@ std::string RunWriter::finish(const RunEnding& ending, const Views& views) {
     throw RecordError(fmt::format("{}: the finished file failed verification: {}; repeat the run", path_.string(),
                                   fmt::join(verification.problems, "; ")));
   }
-  const std::string digest = sha256_of_file(path_);
+  LoadCellColumns cell;
+  RunDigests digests{sha256_of_file(path_), read_run(path_, cell).contents_xxh128};
   const std::filesystem::path target =
       ending.outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
   on_disk(target.string(), [&] {
@@ -282,7 +283,7 @@ std::string RunWriter::finish(const RunEnding& ending, const Views& views) {
     path_ = target;
     files_.sync_folder(target.parent_path());
   });
-  return digest;
+  return digests;
 }
 
 std::uint64_t RunWriter::bytes_needed(std::uint64_t samples, std::uint64_t readings) {

@@ -35,10 +35,10 @@ class RunWriter {
   void sync();
 
   /// Closes and syncs, reopens and verifies, makes read-only, renames `.part` to `.h5` (aborted: `.aborted.h5`, or
-  /// `.aborted-2.h5` …), and syncs the folder. Returns the file's SHA-256. Throws if a complete run fails the
+  /// `.aborted-2.h5` …), and syncs the folder. Returns the file's digests. Throws if a complete run fails the
   /// verification; its .part stays. `views` is asked first, for what of the whole run goes into the file, too.
   using Views = std::function<RunViews(const RunRecording&, const LoadCellColumns&)>;
-  [[nodiscard]] std::string finish(const RunEnding& ending, const Views& views = {});
+  [[nodiscard]] RunDigests finish(const RunEnding& ending, const Views& views = {});
 
   /// Current file: the .part, after finish() the final one.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "base/json.hpp"
+#include "results/digest.hpp"
 #include "results/reduction/repetitions.hpp"
 #include "results/steps_csv.hpp"
 

@@ -304,7 +304,8 @@ class CampaignRun {
     const results::RunRecording recording = results::read_run(run.file);
     const std::uint64_t lost = run.account.lost_network + run.account.lost_host;
     json accepted = {{"file", "runs/" + run.file.filename().string()},
-                     {"sha256", run.sha256},
+                     {"sha256", run.digests.sha256},
+                     {"contents_xxh128", run.digests.contents_xxh128},
                      {"samples", run.account.received},
                      {"lost", lost}};
     const auto driven =

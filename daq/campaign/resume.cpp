@@ -4,6 +4,7 @@
 
 #include "base/error.hpp"
 #include "profiles/strict_yaml.hpp"
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
 #include "results/version.hpp"

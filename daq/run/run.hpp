@@ -16,7 +16,7 @@ namespace kphi::daq {
 
 struct RunResult {
   std::filesystem::path file;
-  std::string sha256;
+  results::RunDigests digests;
   SampleAccount account;
   std::optional<iq::StopReport> stop;  ///< how the motor came to rest
 };

@@ -21,13 +21,43 @@ CountMean mean_of(const CountSums& sums, std::int32_t origin, std::uint64_t samp
 
 std::uint32_t stride_of(const RunHeader& header) { return std::max(header.load_cell.ft_stride, 1u); }
 
+/// So many differences below kSmall have sums that fit into 32 bits, and their squares into 64.
+constexpr std::size_t kNarrow = 128;
+constexpr std::uint32_t kSmall = 1u << 24;
+
+/// In vectors; false, and nothing added, if a difference is not small.
+bool add_narrow(std::span<const std::int32_t> counts, std::int32_t origin, CountSums& sums) {
+  std::uint32_t sum = 0, larger = 0;
+  std::uint64_t squares = 0;
+  for (const std::int32_t count : counts) {
+    const std::uint32_t bits = static_cast<std::uint32_t>(count) - static_cast<std::uint32_t>(origin);
+    const auto difference = static_cast<std::int32_t>(bits);
+    const std::int32_t overflow = (count ^ origin) & (count ^ difference);
+    const std::uint32_t size = difference < 0 ? 0 - bits : bits;
+    larger |= size | (overflow < 0 ? kSmall : 0);
+    sum += bits;
+    squares += std::uint64_t{size} * size;
+  }
+  if (larger >= kSmall) return false;
+  sums.sum += static_cast<std::int32_t>(sum);
+  sums.squares += static_cast<Wide>(squares);
+  return true;
+}
+
+void add_wide(std::span<const std::int32_t> counts, std::int32_t origin, CountSums& sums) {
+  for (const std::int32_t count : counts) {
+    const std::int64_t difference = std::int64_t{count} - origin;
+    sums.sum += difference;
+    sums.squares += static_cast<Wide>(difference) * difference;
+  }
+}
+
 }  // namespace
 
 void CountSums::add(std::span<const std::int32_t> counts, std::int32_t origin) {
-  for (const std::int32_t count : counts) {
-    const std::int64_t difference = std::int64_t{count} - origin;
-    sum += difference;
-    squares += static_cast<Wide>(difference) * difference;
+  for (std::size_t at = 0; at < counts.size(); at += kNarrow) {
+    const auto few = counts.subspan(at, std::min(kNarrow, counts.size() - at));
+    if (!add_narrow(few, origin, *this)) add_wide(few, origin, *this);
   }
 }
 

@@ -51,9 +51,16 @@ results::RunRecording paper_run(int repetition) {
 
 std::size_t make_campaign(const CampaignFolder& folder, int runs, std::vector<StepMean>& steps) {
   std::size_t samples = 0;
+  results::Journal journal(folder.journal());
   for (int repetition = 1; repetition <= runs; ++repetition) {
     const results::RunRecording run = paper_run(repetition);
-    results::test::write_run(folder.run("5x3", 90, repetition), run);
+    const auto file = folder.run("5x3", 90, repetition);
+    const results::RunDigests digests = results::test::write_run(file, run);
+    journal.append(results::kRunAccepted,
+                   {{"file", "runs/" + file.filename().string()},
+                    {"sha256", digests.sha256},
+                    {"contents_xxh128", digests.contents_xxh128}},
+                   0, "");
     const auto of_run = results::reduce(run);
     steps.insert(steps.end(), of_run.begin(), of_run.end());
     samples += run.load_cell.size();

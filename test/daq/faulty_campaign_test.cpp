@@ -1,6 +1,8 @@
 // Campaigns on the deterministic bench whose load cell's wire and box go wrong by a script.
 #include "test/daq/faulty_campaign.hpp"
 
+#include "results/digest.hpp"
+
 namespace kphi::daq {
 namespace faulty_campaign_test {
 

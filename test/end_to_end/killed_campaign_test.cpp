@@ -65,7 +65,7 @@ class KilledCampaign : public testing::TestWithParam<int> {
     ASSERT_GE(state.accepted.size(), accepted_.size()) << "an acceptance is lost";
     for (std::size_t i = 0; i < accepted_.size(); ++i) {
       EXPECT_EQ(state.accepted[i].file, accepted_[i].file);
-      EXPECT_EQ(state.accepted[i].sha256, accepted_[i].sha256);
+      EXPECT_EQ(state.accepted[i].digests.sha256, accepted_[i].digests.sha256);
     }
     accepted_ = state.accepted;
     const std::size_t complete = folder->complete_runs().size();

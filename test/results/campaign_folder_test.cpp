@@ -6,6 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "results/journal.hpp"
+#include "results/reduction/reduction.hpp"
+#include "results/run_reader.hpp"
+#include "results/steps_csv.hpp"
 #include "test/results/recordings.hpp"
 #include "test/results/synthetic_run.hpp"
 #include "test/temporary_folder.hpp"
@@ -76,13 +79,24 @@ TEST(CampaignFolder, ListsCompleteRunsInCampaignOrder) {
 class VerifiedCampaign : public ::testing::Test {
  protected:
   void SetUp() override {
-    const std::string sha = test::write_run(run_, test::make_run({}));
-    Journal(folder_.journal())
-        .append(kRunAccepted, {{"file", "runs/" + run_.filename().string()}, {"sha256", sha}}, 0, "");
+    digests_ = test::write_run(run_, test::make_run({}));
+    accept({{"sha256", digests_.sha256}, {"contents_xxh128", digests_.contents_xxh128}});
+  }
+  void accept(nlohmann::json digests) {
+    digests["file"] = "runs/" + run_.filename().string();
+    Journal(folder_.journal()).append(kRunAccepted, digests, 0, "");
+  }
+  /// A byte of a text in it, which no checksum of its columns covers.
+  void change_the_run() {
+    test::make_writable(run_);
+    std::string bytes = read_text(run_);
+    bytes[bytes.find("5 inch, 3 blades")] = '6';
+    std::ofstream(run_, std::ios::binary) << bytes;
   }
   TemporaryFolder parent_;
   CampaignFolder folder_ = CampaignFolder::create(parent_.path(), "u", "c");
   std::filesystem::path run_ = folder_.run("5x3", 90, 2);
+  RunDigests digests_;
 };
 
 TEST_F(VerifiedCampaign, IsWholeAsItWasLeft) {
@@ -106,14 +120,52 @@ TEST_F(VerifiedCampaign, EveryFlippedByteOfARunShows) {
 TEST_F(VerifiedCampaign, NoCommandTakesARunThatWasChanged) {
   EXPECT_NO_THROW(require_unchanged_run(run_, digests_beside(run_)));
   EXPECT_NO_THROW(require_unchanged_run(run_, {})) << "by its own checksums";
-  test::make_writable(run_);
-  std::string bytes = read_text(run_);
-  bytes[bytes.find("5 inch, 3 blades")] = '6';
-  std::ofstream(run_, std::ios::binary) << bytes;
+  change_the_run();
   EXPECT_THAT(test::error_of<DataRejected>([&] { require_unchanged_run(run_, digests_beside(run_)); }),
               HasSubstr("SHA-256 does not match the journal; restore it from a copy"));
   std::filesystem::remove(folder_.journal());
   EXPECT_THROW(require_unchanged_run(run_, digests_beside(run_)), DataRejected);
+}
+
+TEST_F(VerifiedCampaign, WhatIsReadOfARunIsWhatWasWritten) {
+  LoadCellColumns cell;
+  const auto digests = digests_beside(run_);
+  EXPECT_NO_THROW((void)read_unchanged_run(run_, digests, cell));
+  const auto another = folder_.run("5x3", 90, 3);
+  test::write_run(another, test::make_run({.seed = 7}));
+  std::filesystem::rename(another, run_);
+  EXPECT_THAT(test::error_of<DataRejected>([&] { (void)read_unchanged_run(run_, digests, cell); }),
+              HasSubstr("SHA-256 does not match the journal; restore it from a copy"));
+}
+
+TEST_F(VerifiedCampaign, NoFlippedByteOfARunChangesWhatIsRead) {
+  LoadCellColumns cell;
+  const auto digests = digests_beside(run_);
+  const auto steps = format_steps(reduce(read_unchanged_run(run_, digests, cell), cell));
+  test::make_writable(run_);
+  const std::string whole = read_text(run_);
+  int refused = 0;
+  for (std::size_t at = 3; at < whole.size(); at += whole.size() / 300) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x10);
+    std::ofstream(run_, std::ios::binary) << bytes;
+    try {
+      ASSERT_EQ(format_steps(reduce(read_unchanged_run(run_, digests, cell), cell)), steps) << at;
+    } catch (const DataRejected&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 150) << "all but what a reduction does not read";
+}
+
+TEST_F(VerifiedCampaign, AnOlderJournalKnowsTheSha256Alone) {
+  LoadCellColumns cell;
+  std::filesystem::remove(folder_.journal());
+  accept({{"sha256", digests_.sha256}});
+  EXPECT_NO_THROW((void)read_unchanged_run(run_, digests_beside(run_), cell));
+  change_the_run();
+  EXPECT_THAT(test::error_of<DataRejected>([&] { (void)read_unchanged_run(run_, digests_beside(run_), cell); }),
+              HasSubstr("SHA-256 does not match the journal; restore it from a copy"));
 }
 
 TEST_F(VerifiedCampaign, AMissingAndAnUnknownRunShow) {

@@ -1,4 +1,4 @@
-// SHA-256, and what a power cut must not take.
+// What a power cut must not take.
 #include "results/file_layer.hpp"
 
 #include <gmock/gmock.h>
@@ -16,15 +16,6 @@ namespace kphi::results::file_layer_test {
 
 using kphi::test::TemporaryFolder;
 using namespace testing;
-
-TEST(Sha256, KnowsTheStandardsExamples) {  // FIPS 180-2, appendix B.1
-  EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  const TemporaryFolder folder;
-  std::ofstream(folder / "abc") << "abc";
-  EXPECT_EQ(sha256_of_file(folder / "abc"), sha256("abc"));
-  EXPECT_THROW((void)sha256_of_file(folder / "nothing"), RecordError);
-}
 
 /// Logs what is made to last, in order: "sync NAME SIZE", "replace FROM TO", "rename FROM TO", "folder NAME".
 class LoggedDisk : public FileLayer {

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <thread>
 
+#include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/hdf5.hpp"
 #include "results/reduction/clock_map.hpp"
@@ -160,10 +161,12 @@ TEST_F(RunFile, IsDescribedInTheReadme) {
   told(std::string("`") + kRunFormat + "`");
 }
 
-TEST_F(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestThatFinishGave) {
-  const std::string sha = write_run(path, run);
+TEST_F(RunFile, IsReadOnlyUnderItsFinalNameWithTheDigestsThatFinishGave) {
+  const RunDigests digests = write_run(path, run);
   EXPECT_FALSE(std::filesystem::exists(folder / "a.h5.part"));
-  EXPECT_EQ(sha, sha256_of_file(path));
+  EXPECT_EQ(digests.sha256, sha256_of_file(path));
+  LoadCellColumns cell;
+  EXPECT_EQ(digests.contents_xxh128, read_run(path, cell).contents_xxh128);
   struct stat info {};
   ASSERT_EQ(stat((path).c_str(), &info), 0);
   EXPECT_EQ(info.st_mode & 0222u, 0u);
@@ -188,9 +191,9 @@ TEST_F(RunFile, SameInputGivesSameBytesInAnotherProcess) {
 }
 
 TEST_F(RunFile, NeverOverwritesAFinalFile) {
-  const std::string sha = write_run(path, run);
+  const std::string sha256 = write_run(path, run).sha256;
   EXPECT_THAT(error_of<RecordError>([&] { RunWriter writer(path, run.header); }), HasSubstr("exists already"));
-  EXPECT_EQ(sha, sha256_of_file(path));
+  EXPECT_EQ(sha256, sha256_of_file(path));
 }
 
 TEST_F(RunFile, DoesNotReplaceAFileThatAppearedMeanwhile) {

@@ -198,7 +198,7 @@ inline void write_pieces(RunWriter& writer, const RunRecording& run, std::size_t
   }
 }
 
-inline std::string write_run(const std::filesystem::path& path, const RunRecording& run, FileLayer& files = disk()) {
+inline RunDigests write_run(const std::filesystem::path& path, const RunRecording& run, FileLayer& files = disk()) {
   RunWriter writer(path, run.header, files);
   write_pieces(writer, run);
   return writer.finish(run, views_of);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "results/file_layer.hpp"
+#include "results/digest.hpp"
 #include "test/soak/verdict_checks.hpp"
 
 namespace kphi::soak {

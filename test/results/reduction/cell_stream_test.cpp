@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <vector>
+
 #include "test/results/synthetic_run.hpp"
 
 namespace kphi::results::cell_stream_test {
@@ -27,6 +32,33 @@ TEST(CellBins, HoldEverySampleOnceHoweverTheyAreCut) {
       (static_cast<double>(left.n) * left.force.mean + static_cast<double>(right.n) * right.force.mean) /
       static_cast<double>(whole.n);
   EXPECT_NEAR(joined, whole.force.mean, 1e-6 * std::abs(whole.force.mean));
+}
+
+/// The sums are taken in narrow numbers where they fit; the wide ones are the definition.
+TEST(CountSums, AreExactForCountsOfAnySize) {
+  std::mt19937 dice(5);
+  for (const std::int32_t bound :
+       {1, 1 << 20, (1 << 24) - 1, 1 << 24, 1 << 30, std::numeric_limits<std::int32_t>::max()}) {
+    for (const std::size_t n : {0u, 1u, 70u, 127u, 128u, 129u, 1000u}) {
+      std::uniform_int_distribution<std::int32_t> count(-bound - (bound > 1 << 30), bound);
+      const std::int32_t origin = count(dice);
+      std::vector<std::int32_t> counts(n);
+      std::ranges::generate(counts, [&] { return count(dice); });
+      CountSums sums;
+      sums.add(counts, origin);
+      std::int64_t sum = 0;
+      Wide squares = 0;
+      for (const std::int64_t each : counts) {
+        sum += each - origin;
+        squares += static_cast<Wide>(each - origin) * (each - origin);
+      }
+      EXPECT_EQ(sums.sum, sum) << bound << ", " << n;
+      EXPECT_TRUE(sums.squares == squares) << bound << ", " << n;
+    }
+  }
+  CountSums ends;
+  ends.add(std::vector{std::numeric_limits<std::int32_t>::max()}, std::numeric_limits<std::int32_t>::min());
+  EXPECT_EQ(ends.sum, 4294967295) << "a difference that 32 bits would take for -1";
 }
 
 TEST(CellBins, ComeToTheSameBitsFromAnotherBeginning) {

@@ -1,0 +1,128 @@
+#include "results/digest.hpp"
+
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <openssl/evp.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/ordered_work.hpp"
+#include "results/file_layer.hpp"
+
+#define XXH_INLINE_ALL  // no library to link
+#include <xxhash.h>
+
+namespace kphi::results {
+
+void update_by_avx2(XXH3_state_t* state, const void* bytes, std::size_t n);  // xxh3_avx2.cpp, on x86_64 only
+
+namespace {
+
+/// Without its configuration file and its error texts, which a short command would spend a tenth of its time on.
+void start_openssl() {
+  static const int started = OPENSSL_init_crypto(OPENSSL_INIT_NO_LOAD_CONFIG | OPENSSL_INIT_NO_LOAD_CRYPTO_STRINGS |
+                                                     OPENSSL_INIT_NO_ADD_ALL_CIPHERS | OPENSSL_INIT_NO_ADD_ALL_DIGESTS,
+                                                 nullptr);
+  (void)started;
+}
+
+using Update = void (*)(XXH3_state_t*, const void*, std::size_t);
+
+Update quickest_update() {
+#ifdef __x86_64__
+  if (__builtin_cpu_supports("avx2")) return &update_by_avx2;
+#endif
+  return [](XXH3_state_t* state, const void* bytes, std::size_t n) { XXH3_128bits_update(state, bytes, n); };
+}
+
+void check(bool ok) {
+  if (!ok) throw RecordError("OpenSSL: SHA-256 is not available; check the OpenSSL configuration");
+}
+
+}  // namespace
+
+Sha256::Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+  start_openssl();
+  check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1);
+}
+
+void Sha256::update(std::string_view bytes) {
+  check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256::hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> raw{};
+  unsigned size = 0;
+  check(EVP_DigestFinal_ex(context_.get(), raw.data(), &size) == 1);
+  return fmt::format("{:02x}", fmt::join(raw.begin(), raw.begin() + size, ""));
+}
+
+std::string sha256(std::string_view bytes) {
+  Sha256 digest;
+  digest.update(bytes);
+  return digest.hex();
+}
+
+std::string sha256_of_file(const std::filesystem::path& path) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) throw RecordError(failure_text(path.string(), errno));
+  Sha256 digest;
+  std::vector<char> block(1 << 18);
+  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update({block.data(), n});
+  if (std::ferror(file.get())) throw RecordError(failure_text(path.string(), errno));
+  return digest.hex();
+}
+
+struct Xxh128::State {
+  XXH3_state_t of;
+};
+
+Xxh128::Xxh128() : state_(std::make_unique<State>()) { XXH3_128bits_reset(&state_->of); }
+
+Xxh128::Xxh128(Xxh128&&) noexcept = default;
+
+Xxh128::~Xxh128() = default;
+
+void Xxh128::update(std::string_view bytes) {
+  static const auto quickest = quickest_update();
+  quickest(&state_->of, bytes.data(), bytes.size());
+}
+
+std::string Xxh128::hex() const {
+  const XXH128_hash_t hash = XXH3_128bits_digest(&state_->of);
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+std::string xxh128(std::string_view bytes) {
+  Xxh128 digest;
+  digest.update(bytes);
+  return digest.hex();
+}
+
+HashedText::HashedText(const std::filesystem::path& path, std::size_t most_bytes)
+    : path_(path), file_(reading(path, [&] { return TextFile(path, most_bytes); })) {}
+
+TextBlocks HashedText::blocks() {
+  return {[this] {
+            const std::string_view block = reading(path_, [this] { return file_.next_block(); });
+            hash(block);
+            return block;
+          },
+          file_.size()};
+}
+
+void HashedText::hash(std::string_view block) {
+  if (hashing_.valid()) hashing_.get();
+  hashing_ = std::async(launch_for(block.size()), [this, text = std::string(block)] { digest_.update(text); });
+}
+
+std::string HashedText::sha256() {
+  if (hashing_.valid()) hashing_.get();
+  return digest_.hex();
+}
+
+}  // namespace kphi::results
