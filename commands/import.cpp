@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <filesystem>
+#include <future>
 #include <map>
 #include <vector>
 
+#include "base/ordered_work.hpp"
 #include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
@@ -86,8 +88,10 @@ ImportedLog import_file(const std::string& path, const ImportRequest& request, c
   const std::string name = fs::path(path).stem().string();
   const fs::path folder = fs::path(request.out) / name;
   fs::create_directories(folder);
+  std::future<ThrustFit> fitting =
+      std::async(launch_for(table.size() * sizeof(Point)), [&table] { return fit_thrust(points_of(table)); });
   results::write_steps(folder / "steps.csv", {table.size(), [&](std::size_t row) { return table.step(row); }});
-  const ThrustFit fit = fit_thrust(points_of(table));
+  const ThrustFit fit = fitting.get();
   const std::string record = import_record(import, fit, text.sha256(), path, options, kVersion);
   write_output(folder / "import.json", record);
   print_findings(import, path);

@@ -262,6 +262,7 @@ void append(StandLog& log, LogBlock block) {
 LogBlock read_block(const Table& begin, std::string_view text, std::size_t line, const RowFormat& format) {
   LogBlock block;
   block.bytes = text.size();
+  block.rows.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')) + 1);
   Table table = read_csv_rows(begin, text, line, format.separator, [&](const Table&, const TableRow& fields) {
     if (const auto row = read_row(fields, format, begin.path, block)) block.rows.push_back(*row);
   });
