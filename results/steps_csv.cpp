@@ -149,7 +149,10 @@ struct Append {
   const StepMean& step;
   std::string& line;
   void operator()(std::string StepMean::*m) const { append_quoted(line, step.*m); }
-  void operator()(auto StepMean::*m) const { fmt::format_to(std::back_inserter(line), "{}", step.*m); }
+  void operator()(auto StepMean::*m) const {
+    const fmt::format_int digits(step.*m);
+    line.append(digits.data(), digits.size());
+  }
   void operator()(double StepMean::*m) const {
     if (!std::isnan(step.*m)) append_shortest(line, step.*m);
   }

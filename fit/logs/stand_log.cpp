@@ -253,7 +253,9 @@ std::optional<StandRow> read_row(const TableRow& fields, const RowFormat& format
 }
 
 void append(StandLog& log, LogBlock block) {
-  const auto move_to = [](auto& to, auto& from) { std::ranges::move(from, std::back_inserter(to)); };
+  const auto move_to = [](auto& to, auto& from) {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  };
   move_to(log.rows, block.rows);
   move_to(log.problems, block.problems);
   move_to(log.not_numbers, block.not_numbers);
@@ -262,7 +264,6 @@ void append(StandLog& log, LogBlock block) {
 LogBlock read_block(const Table& begin, std::string_view text, std::size_t line, const RowFormat& format) {
   LogBlock block;
   block.bytes = text.size();
-  block.rows.reserve(static_cast<std::size_t>(std::ranges::count(text, '\n')) + 1);
   Table table = read_csv_rows(begin, text, line, format.separator, [&](const Table&, const TableRow& fields) {
     if (const auto row = read_row(fields, format, begin.path, block)) block.rows.push_back(*row);
   });
@@ -280,6 +281,12 @@ std::string_view head_of(std::string_view text) {
     blank = text.substr(begin, end - begin).find_first_not_of(" \t\r\n\xEF\xBB\xBF") == std::string_view::npos;
   }
   return text.substr(0, end);
+}
+
+std::size_t line_ends(std::string_view text) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find('\n'); at != std::string_view::npos; at = text.find('\n', at + 1)) ++n;
+  return n;
 }
 
 /// `map` finds the columns when the header is known. A thread per processor reads blocks.
@@ -303,12 +310,12 @@ StandLog read_rows(TextBlocks text, std::string path, const CsvDialect& dialect,
     }
     append(log, std::move(block));
   });
-  std::size_t line = 1 + static_cast<std::size_t>(std::ranges::count(head, '\n'));
+  std::size_t line = 1 + line_ends(head);
   std::string_view block = text.front().substr(head.size());
   for (; !text.front().empty(); text.pop(), block = text.front()) {
     blocks.add(launch_for(block.size()),
                [&begin, &format, line, text = std::string(block)] { return read_block(begin, text, line, format); });
-    line += static_cast<std::size_t>(std::ranges::count(block, '\n'));
+    line += line_ends(block);
   }
   blocks.finish();
   return log;
