@@ -122,6 +122,7 @@ void refuse_for_table(const FitRequest& request) {
 
 Identification identify_input(const FitInput& input, const FitRequest& request) {
   IdentificationOptions options = options_of(request);
+  options.mounted_once = input.mounted_once;
   if (input.table.empty()) {
     Identification result = identify(input.steps, options);
     if (result.propeller.empty()) result.propeller = input.provenance.campaign;

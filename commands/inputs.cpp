@@ -85,6 +85,7 @@ FitInput campaign_input(const fs::path& path) {
     input.provenance.campaign = campaign.name;
     input.provenance.propeller_name = campaign.propeller.name;
     input.provenance.supply_v = campaign.supply.value();
+    input.mounted_once = !campaign.order.remount_each_repetition;
   }
   return input;
 }

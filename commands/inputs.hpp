@@ -24,6 +24,7 @@ struct FitInput {
   fit::Provenance provenance;
   std::filesystem::path folder;  ///< where the outputs go
   bool campaign = false;         ///< `folder` is a campaign folder
+  bool mounted_once = false;     ///< one mounting for all repetitions of an occlusion
 };
 
 /// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming

@@ -300,6 +300,7 @@ void read_fit(const Value& map, Coefficients::Fit& into) {
     if (!run.node().IsScalar()) run.refuse("a run in `leave_out` is not a text", kFitAgain);
     into.leave_out.push_back(run.text());
   }
+  if (const auto once = map.find("mounted_once")) into.mounted_once = once->truth();
   if (!map.find("u")) return;
   into.bench.emplace();
   for (const auto& [name, value] : map.map_at("u").entries()) into.bench->emplace_back(name, value.number());

@@ -66,6 +66,7 @@ struct Coefficients {
     std::string k_by, weights, loss;
     std::optional<std::pair<double, double>> speed_range_rpm;          ///< lowest and highest level fitted
     std::vector<std::string> leave_out;                                ///< "PHI:REPETITION:CAUSE"
+    bool mounted_once = false;                                         ///< one mounting for all runs of an occlusion
     std::optional<std::vector<std::pair<std::string, double>>> bench;  ///< `u`: uncertainties of the stand, by name
   };
   struct Provenance {

@@ -140,6 +140,7 @@ class LoadCellLink {
 struct RunBeginning {
   double occlusion_deg = 0;
   int repetition = 1;
+  bool mounted_anew = true;  ///< false: as the other runs of this occlusion are
   Instant after{0};  ///< bench time at which the campaign's last run was accepted, also before a resumption; 0: none
 };
 

@@ -176,7 +176,8 @@ class CampaignRun {
 
   void execute_run(const profiles::PlannedRun& planned) {
     mount(planned);
-    bench_.begin_run({planned.occlusion_deg, planned.repetition, accepted_at_});
+    bench_.begin_run(
+        {planned.occlusion_deg, planned.repetition, campaign_.order.remount_each_repetition, accepted_at_});
     const auto file = file_of(planned);
     const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
     const double remaining_s = per_run_s * (planned_ - result_.runs);

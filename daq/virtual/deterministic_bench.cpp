@@ -106,8 +106,9 @@ void DeterministicBench::begin_run(const RunBeginning& run) {
   if (lives_ == Lives::whole_campaign) return;
   sim::BenchSettings settings = simulated_devices(config_, other_, run.repetition);
   settings.begin = run.after;
-  settings.seed = mixed(mixed(mixed(settings.seed) ^ std::bit_cast<std::uint64_t>(run.occlusion_deg)) ^
-                        static_cast<std::uint64_t>(run.repetition));
+  const std::uint64_t of_occlusion = mixed(mixed(settings.seed) ^ std::bit_cast<std::uint64_t>(run.occlusion_deg));
+  settings.seed = mixed(of_occlusion ^ static_cast<std::uint64_t>(run.repetition));
+  if (!run.mounted_anew) settings.plant.stand.mounting_seed = of_occlusion;
   make_devices(settings);
   if (mounted_) sim_->mount(mounted_->first, mounted_->second);
 }

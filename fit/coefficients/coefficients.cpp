@@ -138,6 +138,7 @@ std::string fit_options(const Identification& identification, const std::optiona
   for (const LeftOutRun& run : identification.options.left_out)
     left_out.push_back(quoted(fmt::format("{}:{}:{}", shortest(run.phi_deg), run.repetition, run.cause)));
   if (!left_out.empty()) text += fmt::format(", leave_out: [{}]", fmt::join(left_out, ", "));
+  if (identification.options.mounted_once) text += ", mounted_once: true";
   if (!bench) return text;
   for (const auto& [name, value] : known_uncertainties(*bench)) known.push_back(name + ": " + yaml_number(value));
   return text + fmt::format(", u: {{{}}}", fmt::join(known, ", "));
@@ -256,6 +257,7 @@ RecordedFit read_recorded_fit(const std::string& path) {
             std::array{Estimator::through_origin, Estimator::with_offset, Estimator::polynomial, Estimator::at_speed});
   options.weighting = named(fit.weights, "weights", path,
                             std::array{Weighting::equal, Weighting::thrust, Weighting::effective_variance});
+  options.mounted_once = fit.mounted_once;
   options.loss = named(fit.loss, "loss", path, std::array{Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
   for (const std::string& run : fit.leave_out) options.left_out.push_back(parse_left_out_run(run));
   if (!fit.bench) return record;

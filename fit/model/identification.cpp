@@ -197,6 +197,8 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
     repeatability.between.u = *options.mounting;
     repeatability.between_known = true;
   }
+  repeatability.mounted_once = options.mounted_once && repeatability.repeated;
+  if (repeatability.mounted_once) repeatability.mounting = options.mounting;
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
     if (repeatability.between_known) row.standard_error = repeatability.independent_u(i);

@@ -34,7 +34,8 @@ struct IdentificationOptions {
   Loss loss = Loss::none;
   SpeedRange speed_range{.min_rad_s = kSpeedMinRpm * 3.14159265358979323846 / 30};
   std::vector<LeftOutRun> left_out{};
-  std::optional<double> mounting{};  ///< relative, of k from mounting to mounting, for a campaign without repetitions
+  std::optional<double> mounting{};  ///< relative, of k from mounting to mounting, where repetitions do not tell it
+  bool mounted_once = false;         ///< one mounting for all repetitions of a φ: their scatter does not hold it
   std::optional<double> at_speed_rad_s{};  ///< for "k at speed"; default: the highest level measured at every φ
   CurveOptions curve{};
   std::string propeller{};  ///< empty: as the steps say

@@ -145,7 +145,8 @@ std::vector<OutlyingRun> outlying_runs(std::span<const results::StepMean> used) 
 
 double Repeatability::independent_u(std::size_t i) const {
   const AngleScatter& angle = angles[i];
-  return std::sqrt(std::pow(angle.within_u(), 2) + std::pow(angle.zero_u(), 2) + std::pow(between_u(*this, angle), 2));
+  return std::sqrt(std::pow(angle.within_u(), 2) + std::pow(angle.zero_u(), 2) + std::pow(between_u(*this, angle), 2) +
+                   std::pow(mounting.value_or(0) * angle.k, 2));
 }
 
 double Repeatability::freedom() const {

@@ -2,6 +2,7 @@
 // (mounting, air, bearing), pooled over all occlusions as a share of k, since three repetitions alone are too few.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,8 +57,10 @@ struct Repeatability {
   std::vector<AngleScatter> angles;
   Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
   bool repeated = false;  ///< at least one φ was measured more than once
-  bool between_known = false;  ///< from repetitions, or given
-  Estimate zero_movement{};    ///< of a run's zero, usually, N; freedom: the runs behind it
+  bool between_known = false;        ///< from repetitions, or given
+  bool mounted_once = false;         ///< for all repetitions of a φ: `between` does not hold the mounting
+  std::optional<double> mounting{};  ///< then: standard deviation of k from mounting to mounting, as a share, if given
+  Estimate zero_movement{};          ///< of a run's zero, usually, N; freedom: the runs behind it
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;

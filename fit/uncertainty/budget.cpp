@@ -74,6 +74,16 @@ void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
   add_common(sources, "motor clock", "clock", bench.motor_clock, -2);
 }
 
+/// Of plates that were mounted once for all their runs.
+ErrorSource mounting_of(const Repeatability& all) {
+  ErrorSource mounting{"mounting", Evaluation::type_b, "1",
+                       all.mounting ? "as given: each occlusion was mounted once for all its runs"
+                                    : "unknown: each occlusion was mounted once for all its runs; remount it for each "
+                                      "(remount_each_repetition), or give it with --u mounting=VALUE"};
+  for (const AngleScatter& angle : all.angles) mounting.effects.push_back({all.mounting.value_or(kUnknown), angle.k});
+  return mounting;
+}
+
 void add_repeatability(ErrorSources& sources, const Repeatability& all) {
   ErrorSource noise{"noise within runs", Evaluation::type_a, kUnitOfK};
   ErrorSource between{"repetitions", all.repeated ? Evaluation::type_a : Evaluation::type_b, "1"};
@@ -91,6 +101,7 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
     zero.effects.push_back({angle.zero_u_n, angle.zero_sensitivity});
   }
   sources.sources.insert(sources.sources.end(), {noise, between, zero});
+  if (all.mounted_once) sources.sources.push_back(mounting_of(all));
 }
 
 void add_inadequacy(ErrorSources& sources, std::span<const SpeedDependence> speed) {

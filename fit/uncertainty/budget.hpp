@@ -61,7 +61,8 @@ struct BenchUncertainty {
   std::optional<double> alignment_rad;     ///< between thrust and the cell's axis
   std::optional<double> motor_clock;       ///< relative, of the clock behind the speed of the motor module
   std::optional<double> air_density;       ///< relative; enters k in standard air only
-  /// Relative, of k from mounting to mounting; repetitions tell it better. Given to IdentificationOptions, too.
+  /// Relative, of k from mounting to mounting; repetitions that are remounted tell it better. Given to
+  /// IdentificationOptions, too.
   std::optional<double> mounting;
 };
 

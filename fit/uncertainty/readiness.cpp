@@ -73,12 +73,15 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
     if (std::abs(fit.residuals[i]) > std::abs(fit.residuals[worst])) worst = i;
   const double miss = fit.residuals[worst] / fit.K_T;
   if (std::abs(miss) < kNegligible) return Suspicion{};
+  const Repeatability& runs = identification.repeatability;
   return Suspicion{
       p,
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
-       fmt::format("{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
-                   "the plates and their angles",
-                   fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above")}};
+       fmt::format(
+           "{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
+           "the plates and their angles{}",
+           fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above",
+           runs.mounted_once && !runs.mounting ? " (each was mounted once: a crooked mounting looks the same)" : "")}};
 }
 
 std::optional<Suspicion> of_runs(const ModelTests& tests) {

@@ -2,9 +2,13 @@
 #include <gmock/gmock.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <map>
 #include <random>
+#include <ranges>
 #include <tuple>
 
+#include "results/steps_csv.hpp"
 #include "test/end_to_end/program.hpp"
 #include "test/results/recordings.hpp"
 
@@ -75,6 +79,22 @@ TEST(DeterministicCampaign, TellsInTheReportWhetherTheMotorsClockWasCheckedAndCo
   const auto K_T = [](const std::string& text) { return YAML::Load(text)["K_T"]["value"].as<double>(); };
   EXPECT_NEAR(K_T(file_named(checked, "coefficients.yaml")),
               K_T(file_named(unchecked, "coefficients.yaml")) / (1.004 * 1.004), 1e-4 * 1.5e-6);
+}
+
+TEST(DeterministicCampaign, APlateMountedOnceScattersOnceAndARemountedOneWithEachRun) {
+  std::string bench = deterministic_config(5).text;
+  bench.insert(bench.find(", seed: 5"), ", stand: {mounting: 0.03}");
+  const auto spread = [&](const char* order) {
+    const auto files = campaign_on(bench, short_campaign_text("0, 90, 180", 3) + order);
+    std::map<int, double> k;  // by repetition
+    for (const auto& step : results::parse_steps(file_named(files, "steps.csv"), "steps.csv"))
+      if (step.occlusion_deg == 90 && step.step == 4)
+        k[step.repetition] = step.thrust_n / (step.speed_rad_s * step.speed_rad_s);
+    const auto [least, most] = std::ranges::minmax(std::views::values(k));
+    return most / least - 1;
+  };
+  EXPECT_LT(spread(""), 0.005);
+  EXPECT_GT(spread("order: {remount_each_repetition: true}\n"), 0.01);
 }
 
 TEST(DeterministicCampaign, NoChangedBitOfAFittedFolderPassesUnnoticed) {

@@ -79,7 +79,7 @@ Plant::Plant(const PlantParameters& parameters, std::uint64_t seed)
     : density_share_(parameters.air_density_kg_m3 / 1.225),
       stand_(parameters.stand),
       random_(seed),
-      mountings_(seed ^ kMountingStream),
+      mountings_(stand_.mounting_seed.value_or(seed) ^ kMountingStream),
       motor_(parameters.motor),
       load_cell_(parameters.load_cell, random_) {
   mount(nullptr, 0);

@@ -24,8 +24,9 @@ struct Plate {
 struct StandParameters {
   std::optional<ThrustLaw> law;  ///< of whatever propeller is mounted; nullopt: its own
   double bend = 0;  ///< of k(φ) above the line, share of K_T: a parabola, highest at 135°, 0 at 0° and 270°
-  double rise_per_krad_s = 0;  ///< of k with the speed, share; k is as given at 1000 rad/s
-  double mounting = 0;         ///< standard deviation of k from mounting to mounting, share
+  double rise_per_krad_s = 0;                    ///< of k with the speed, share; k is as given at 1000 rad/s
+  double mounting = 0;                           ///< standard deviation of k from mounting to mounting, share
+  std::optional<std::uint64_t> mounting_seed{};  ///< nullopt: by that of the plant
   std::vector<Plate> plates;
 
   /// At 1000 rad/s and 1.225 kg/m³, N/(rad/s)², before the scatter of the mountings. Degrees, [0, 360).

@@ -116,11 +116,12 @@ TEST(CoefficientFile, GivesTheFit) {
   const std::string with_fit =
       with(kGood, "estimator: huber}",
            "estimator: huber, k_by: offset, weights: thrust, loss: none, speed_range_rpm: [3000.0, 17000.0], "
-           "leave_out: [\"90:2:slipped\"], u: {clock: 1.0e-05}}");
+           "leave_out: [\"90:2:slipped\"], mounted_once: true, u: {clock: 1.0e-05}}");
   const Coefficients c = parse_coefficients(with_fit, "c.yaml");
   EXPECT_EQ(c.provenance.fit.k_by, "offset");
   EXPECT_EQ(c.provenance.fit.speed_range_rpm->second, 17000);
   EXPECT_EQ(c.provenance.fit.leave_out, std::vector<std::string>{"90:2:slipped"});
+  EXPECT_TRUE(c.provenance.fit.mounted_once);
   ASSERT_TRUE(c.provenance.fit.bench);
   EXPECT_EQ(c.provenance.fit.bench->front().second, 1e-5);
   EXPECT_THAT(refusal_of(with(with_fit, "[3000.0, 17000.0]", "[3000.0]")), HasSubstr("speed_range_rpm"));

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "compensation/file/coefficient_file.hpp"
@@ -131,6 +132,24 @@ TEST(Analysis, OneRunEachTakesTheScatterOfMountingsAsGiven) {
   EXPECT_EQ(identify(campaign_steps(), {.mounting = 0.5}).repeatability.between.u,
             identify(campaign_steps()).repeatability.between.u)
       << "repetitions tell it better";
+}
+
+TEST(Analysis, PlatesMountedOnceLeaveTheScatterOfMountingsUnknownHoweverManyRuns) {
+  const Identification unknown = identify(campaign_steps(), {.mounted_once = true});
+  const auto budget = analyse(unknown).coefficients[1];
+  EXPECT_FALSE(row_of(budget, "mounting").known());
+  EXPECT_TRUE(row_of(budget, "repetitions").known());
+  EXPECT_THAT(budget.not_known(), testing::Contains("mounting"));
+
+  const Identification given = identify(campaign_steps(), {.mounting = 0.003, .mounted_once = true});
+  EXPECT_NEAR(row_of(analyse(given).coefficients[1], "mounting").contribution() / given.table[1].k, 0.003, 1e-12);
+  EXPECT_NEAR(given.table[1].standard_error, std::hypot(unknown.table[1].standard_error, 0.003 * given.table[1].k),
+              1e-15)
+      << "the line and its test allow for it";
+
+  const auto remounted = analyse(identify(campaign_steps())).coefficients[1];
+  EXPECT_TRUE(std::ranges::none_of(remounted.rows, [](const BudgetRow& row) { return row.source == "mounting"; }))
+      << "their repetitions hold it";
 }
 
 TEST(Analysis, OfATableUsesItsOwnErrors) {
