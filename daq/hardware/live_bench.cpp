@@ -15,6 +15,7 @@
 #include "daq/hardware/sleep_inhibitor.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/netbox/configuration/http.hpp"
+#include "drivers/netbox/wire/rdt.hpp"
 #include "drivers/sim/control_line.hpp"
 
 namespace kphi::daq {
@@ -68,6 +69,15 @@ std::string page_of(const profiles::NetBoxConfig& config, const std::string& tar
 
 void require_no_stop(const std::function<bool()>& stop_asked) {
   if (stop_asked()) throw Interrupted("stopped by request before anything was switched on");
+}
+
+/// The box first: it is quick.
+std::vector<LastWord> last_words(const profiles::NetBoxConfig& box, const LiveSupply* supply) {
+  const auto stop = netbox::encode_request(netbox::Command::stop);
+  std::vector<LastWord> words{{"stream of the Net Box " + box.host, LastWord::Wire::udp, box.host, box.rdt_port,
+                               std::string(stop.begin(), stop.end())}};
+  if (supply != nullptr && supply->off()) words.push_back(*supply->off());
+  return words;
 }
 
 }  // namespace
@@ -206,6 +216,7 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
       air_(config.ambient, clock_),
       load_cell_(config.netbox, clock_, stop_asked),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
+      sentinel_(last_words(config.netbox, supply_.get())),
       power_(supply_to_switch_on(stop_asked)),
       motor_(config.iq, clock_) {}
 

@@ -12,6 +12,7 @@
 #include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/hardware/live_supply.hpp"
+#include "daq/sentinel/sentinel.hpp"
 #include "drivers/iq/link/motor.hpp"
 #include "drivers/netbox/configuration/settings.hpp"
 #include "drivers/netbox/receive/load_cell.hpp"
@@ -106,7 +107,8 @@ class LiveBench final : public Bench {
   AirSource air_;
   LiveLoadCell load_cell_;
   std::unique_ptr<LiveSupply> supply_;
-  MotorPower power_;  ///< made before the motor, which needs it to answer; destroyed after it
+  Sentinel sentinel_;  ///< from before anything has power until nothing has
+  MotorPower power_;   ///< made before the motor, which needs it to answer; destroyed after it
   LiveMotor motor_;
 };
 

@@ -14,6 +14,8 @@ class LiveSupply final : public SupplyLink {
   /// Finds it; its output is as it was. Throws DeviceError. `clock` outlives this.
   LiveSupply(const profiles::SupplyConfig& config, const Clock& clock);
   [[nodiscard]] std::string identity() const override;
+  /// For the sentinel.
+  [[nodiscard]] const std::optional<LastWord>& off() const { return worker_.identity().off; }
   std::size_t take(std::span<SupplyReading> out) override { return worker_.take(out); }
   [[nodiscard]] std::string failure() const override;
   void cut() noexcept override { worker_.switch_off(); }

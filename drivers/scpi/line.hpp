@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include "base/last_word.hpp"
 #include "base/tcp.hpp"
 #include "drivers/usb/bus.hpp"
 
@@ -28,6 +29,10 @@ class Line {
   /// The answer without its end of line.
   [[nodiscard]] virtual std::string query(std::string_view command) = 0;
   [[nodiscard]] virtual const std::string& name() const noexcept = 0;
+  /// This command to the `device`, for another process to say; nullopt where only this process can.
+  [[nodiscard]] virtual std::optional<LastWord> last_word(std::string_view, const std::string&) const {
+    return std::nullopt;
+  }
 };
 
 /// A plain TCP connection, port 5025 by custom.
@@ -40,6 +45,9 @@ class Tcp final : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }
+  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, const std::string& device) const override {
+    return LastWord{device, LastWord::Wire::tcp, host_, port_, std::string(command) + "\n"};
+  }
 
  private:
   void connect();

@@ -13,6 +13,8 @@
 namespace kphi::scpi {
 namespace {
 
+constexpr const char* kOff = "OUTP OFF";
+
 constexpr double kMarginOfReading = 1.1;  // a supply shows a little more than it can be set to
 constexpr int kLongestQueue = 64;         // of errors; real ones hold 10 to 32
 constexpr double kStep = 0.001;           // V and A
@@ -60,6 +62,7 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" does not name a model", "check that this is a SCPI instrument");
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
+  identity_.off = line_->last_word(kOff, identity_.device);
   forget_errors();
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");
@@ -100,7 +103,7 @@ SupplyReading ScpiSupply::read() {
 }
 
 void ScpiSupply::switch_output(bool on) {
-  tell(on ? "OUTP ON" : "OUTP OFF");
+  tell(on ? "OUTP ON" : kOff);
   if ((ask("OUTP?") != 0) != on) fail("OUTP", on ? "the output stays off" : "the output stays on", "switch it by hand");
 }
 

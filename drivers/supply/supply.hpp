@@ -5,10 +5,12 @@
 #pragma once
 
 #include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "base/device_data.hpp"
+#include "base/last_word.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::supply {
@@ -29,6 +31,7 @@ struct Identity {
   std::string serial;                           ///< empty: unknown
   std::string firmware;                         ///< "1.28"; empty: unknown
   double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
+  std::optional<LastWord> off{};                ///< switches its output off; nullopt: only this process can
 };
 
 class PoweredOutput;

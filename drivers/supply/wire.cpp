@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <boost/crc.hpp>
 #include <cmath>
 #include <iterator>
 
@@ -175,6 +176,24 @@ const Model* find_model(std::string_view name) {
 
 const Model* find_model(const RegisterMap& map, std::uint16_t id) {
   return first_model([&](const Model& m) { return m.map == &map && m.first_id <= id && id <= m.last_id; });
+}
+
+LastWord off_word(const Address& address, const RegisterMap& map, std::string device) {
+  const unsigned at = static_cast<std::uint16_t>(map.output);
+  std::string order;
+  for (const unsigned byte : {static_cast<unsigned>(address.slave), 0x06u, at >> 8u, at & 0xFFu, 0u, 0u})
+    order.push_back(static_cast<char>(byte));
+  if (address.wire == Address::Wire::tcp) {
+    const std::string header("\x4B\x50\0\0\0\x06",
+                             6);  // transaction, Modbus, six bytes (MODBUS Messaging on TCP/IP, 3.1.3)
+    return {std::move(device), LastWord::Wire::tcp, address.tcp.host, address.tcp.port, header + order, order};
+  }
+  boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;  // MODBUS over serial line, 6.2.2: low byte first
+  crc.process_bytes(order.data(), order.size());
+  std::string frame = order;
+  frame.push_back(static_cast<char>(crc.checksum() & 0xFFu));
+  frame.push_back(static_cast<char>(crc.checksum() >> 8u));
+  return {std::move(device), LastWord::Wire::serial, address.device, address.baud, frame, order};
 }
 
 SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexcept {

@@ -17,6 +17,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/last_word.hpp"
 #include "base/uri.hpp"
 #include "drivers/supply/supply.hpp"
 
@@ -102,6 +103,9 @@ struct Model {
 /// nullptr when there is none.
 [[nodiscard]] const Model* find_model(std::string_view name);
 [[nodiscard]] const Model* find_model(const RegisterMap& map, std::uint16_t id);
+
+/// Switches the output of the `device` off, and how it acknowledges that (function 0x06, which echoes).
+[[nodiscard]] LastWord off_word(const Address& address, const RegisterMap& map, std::string device);
 
 /// The device's word for why it has switched off.
 [[nodiscard]] SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexcept;

@@ -58,6 +58,7 @@ inline const std::vector<Room>& rooms() {
       {"daq/bench", {"base", "compensation/units.hpp", "profiles", "results", "drivers"}},
       {"daq/guard", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/audit", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/sentinel", {"base"}},
       {"daq/hardware", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/virtual", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/run", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},

@@ -187,5 +187,25 @@ TEST(SupplyProtection, IsNamedByTheDevicesOwnCode) {
   EXPECT_EQ(protection_of(hanmatek, 0b100000), SupplyProtection::unknown);
 }
 
+TEST(OffWord, WritesZeroToTheOutputOfTheFamilyByFunctionSix) {
+  using Wire = LastWord::Wire;
+  const auto text = [](std::initializer_list<int> bytes) { return std::string(bytes.begin(), bytes.end()); };
+  // A frame of the serial line ends with its CRC, low byte first (checked by a Modbus calculator).
+  const LastWord rtu =
+      off_word(parse_address("modbus-rtu:/dev/ttyUSB1?baud=115200&model=RD6006"), *find_model("RD6006")->map, "supply");
+  EXPECT_EQ(rtu.wire, Wire::serial);
+  EXPECT_EQ(rtu.where, "/dev/ttyUSB1");
+  EXPECT_EQ(rtu.number, 115200u);
+  EXPECT_EQ(rtu.bytes, text({1, 6, 0, 0x12, 0, 0, 0x29, 0xCF}));
+  EXPECT_EQ(rtu.answer, text({1, 6, 0, 0x12, 0, 0})) << "an echo";
+
+  const LastWord tcp = off_word(parse_address("modbus-tcp:192.168.1.20:502?slave=7"), *find_model("DPS5005")->map, "");
+  EXPECT_EQ(tcp.wire, Wire::tcp);
+  EXPECT_EQ(tcp.where, "192.168.1.20");
+  EXPECT_EQ(tcp.number, 502u);
+  EXPECT_EQ(tcp.bytes.substr(2), text({0, 0, 0, 6, 7, 6, 0, 9, 0, 0})) << "behind the transaction";
+  EXPECT_EQ(tcp.answer, text({7, 6, 0, 9, 0, 0}));
+}
+
 }  // namespace wire_test
 }  // namespace kphi::supply

@@ -1,0 +1,19 @@
+// What another process shall say to a device once this one has died: the bytes, and where they go.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace kphi {
+
+struct LastWord {
+  enum class Wire : std::uint8_t { udp, tcp, serial };
+  std::string device;  ///< for messages: "supply RD6024 on /dev/ttyUSB1"
+  Wire wire = Wire::udp;
+  std::string where;    ///< host, or path of the serial port
+  unsigned number = 0;  ///< port, or baud
+  std::string bytes;
+  std::string answer{};  ///< bytes that the device answers with; empty: it does not answer
+};
+
+}  // namespace kphi

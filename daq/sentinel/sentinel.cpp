@@ -1,0 +1,93 @@
+#include "daq/sentinel/sentinel.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <netdb.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cerrno>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+#include "base/error.hpp"
+
+namespace kphi::daq {
+namespace {
+
+constexpr const char* kProgram = "kphi-sentinel";
+
+[[noreturn]] void fail(int error, const std::string& doing) {
+  throw DeviceError("sentinel", doing, std::generic_category().message(error),
+                    fmt::format("install kphi again: {} belongs beside it; without it a program that is killed leaves "
+                                "the supply on",
+                                kProgram));
+}
+
+std::string path_of_program() {
+  std::error_code none;
+  const auto beside = std::filesystem::read_symlink("/proc/self/exe", none).parent_path() / kProgram;
+  return std::filesystem::exists(beside, none) ? beside.string() : kProgram;
+}
+
+std::string in_hex(const std::string& bytes) {
+  return fmt::format("{:02x}", fmt::join(std::vector<std::uint8_t>(bytes.begin(), bytes.end()), ""));
+}
+
+/// By number, since the sentinel asks no name server.
+std::string address_of(const LastWord& word) {
+  if (word.wire == LastWord::Wire::serial) return word.where;
+  addrinfo wanted{};
+  wanted.ai_socktype = SOCK_DGRAM;
+  addrinfo* found = nullptr;
+  if (::getaddrinfo(word.where.c_str(), nullptr, &wanted, &found) != 0) return word.where;
+  const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> all(found, &freeaddrinfo);
+  std::array<char, NI_MAXHOST> text{};
+  if (::getnameinfo(found->ai_addr, found->ai_addrlen, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) != 0)
+    return word.where;
+  return text.data();
+}
+
+std::vector<std::string> arguments_of(const std::vector<LastWord>& words) {
+  constexpr std::array kWires{"udp", "tcp", "serial"};
+  std::vector<std::string> all{kProgram};
+  for (const LastWord& word : words)
+    all.insert(all.end(), {word.device, kWires.at(static_cast<std::size_t>(word.wire)), address_of(word),
+                           std::to_string(word.number), in_hex(word.bytes), in_hex(word.answer)});
+  return all;
+}
+
+}  // namespace
+
+Sentinel::Sentinel(const std::vector<LastWord>& words) {
+  std::array<int, 2> ends{};
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) fail(errno, "start");
+  line_ = Descriptor(ends[0]);
+  const Descriptor its(ends[1]);
+  posix_spawn_file_actions_t files;
+  posix_spawnattr_t attributes;
+  ::posix_spawn_file_actions_init(&files);
+  ::posix_spawn_file_actions_adddup2(&files, its.number(), STDIN_FILENO);
+  ::posix_spawnattr_init(&attributes);
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);  // Ctrl-C at the terminal is not for it
+  std::vector<std::string> arguments = arguments_of(words);
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  const int error = ::posix_spawnp(&process_, path_of_program().c_str(), &files, &attributes, pointers.data(), environ);
+  ::posix_spawn_file_actions_destroy(&files);
+  ::posix_spawnattr_destroy(&attributes);
+  if (error != 0) fail(error, "start");
+}
+
+Sentinel::~Sentinel() {
+  const char released = '.';
+  (void)!::send(line_.number(), &released, 1, MSG_NOSIGNAL);
+  ::waitpid(process_, nullptr, 0);
+}
+
+}  // namespace kphi::daq

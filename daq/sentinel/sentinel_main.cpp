@@ -1,0 +1,165 @@
+// kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
+// its end. Needs the C library alone, so that it is small and nothing in it can fail.
+// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER)…, bytes in hexadecimal digits. Its standard
+// input is the line to that program: a byte releases the sentinel, an end without one is a death.
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
+
+namespace {
+
+constexpr int kTries = 5, kFieldsOfAWord = 6;
+constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700;
+constexpr unsigned kTooLong_s = 20;
+
+struct Bytes {
+  unsigned char of[256];
+  size_t n = 0;
+};
+
+int digit(char c) { return c >= 'a' ? c - 'a' + 10 : c - '0'; }
+
+Bytes from_hex(const char* text) {
+  Bytes bytes;
+  for (; text[0] != 0 && text[1] != 0 && bytes.n < sizeof bytes.of; text += 2)
+    bytes.of[bytes.n++] = static_cast<unsigned char>(digit(text[0]) * 16 + digit(text[1]));
+  return bytes;
+}
+
+struct Word {
+  explicit Word(char** fields)
+      : device(fields[0]),
+        wire(fields[1]),
+        where(fields[2]),
+        number(static_cast<unsigned>(strtoul(fields[3], nullptr, 10))),
+        bytes(from_hex(fields[4])),
+        answer(from_hex(fields[5])) {}
+  const char* device;
+  const char* wire;
+  const char* where;
+  unsigned number;
+  Bytes bytes, answer;
+};
+
+bool within(int file, short event, int limit_ms) {
+  pollfd wanted{file, event, 0};
+  int ready = 0;
+  do ready = poll(&wanted, 1, limit_ms);
+  while (ready < 0 && errno == EINTR);
+  return ready > 0;
+}
+
+speed_t speed_of(unsigned baud) {
+  constexpr struct {
+    unsigned baud;
+    speed_t speed;
+  } kSpeeds[] = {{9600, B9600},     {19200, B19200},   {38400, B38400},   {57600, B57600}, {115200, B115200},
+                 {230400, B230400}, {460800, B460800}, {921600, B921600}, {2400, B2400},   {4800, B4800}};
+  for (const auto& one : kSpeeds)
+    if (one.baud == baud) return one.speed;
+  return B115200;
+}
+
+int opened_serial(const Word& word) {
+  const int port = open(word.where, O_RDWR | O_NOCTTY | O_NONBLOCK);
+  termios settings{};
+  if (port < 0 || tcgetattr(port, &settings) != 0) return port;
+  cfmakeraw(&settings);
+  settings.c_cflag |= CLOCAL | CREAD;
+  cfsetspeed(&settings, speed_of(word.number));
+  tcsetattr(port, TCSANOW, &settings);
+  // An answer to the dead program may still be on its way.
+  unsigned char rubbish[256];
+  for (int waited = 0; waited < kMostNoise_ms && within(port, POLLIN, kQuiet_ms); waited += kQuiet_ms)
+    if (read(port, rubbish, sizeof rubbish) <= 0) break;
+  return port;
+}
+
+int opened_socket(const Word& word, int type) {
+  sockaddr_storage to{};
+  auto* v4 = reinterpret_cast<sockaddr_in*>(&to);
+  auto* v6 = reinterpret_cast<sockaddr_in6*>(&to);
+  socklen_t length = sizeof *v4;
+  if (inet_pton(AF_INET, word.where, &v4->sin_addr) == 1) {
+    v4->sin_family = AF_INET;
+    v4->sin_port = htons(static_cast<uint16_t>(word.number));
+  } else if (inet_pton(AF_INET6, word.where, &v6->sin6_addr) == 1) {
+    v6->sin6_family = AF_INET6;
+    v6->sin6_port = htons(static_cast<uint16_t>(word.number));
+    length = sizeof *v6;
+  }
+  const int file = socket(to.ss_family, type | SOCK_NONBLOCK, 0);
+  if (file < 0) return -1;
+  if (connect(file, reinterpret_cast<sockaddr*>(&to), length) == 0) return file;
+  if (errno == EINPROGRESS && within(file, POLLOUT, kConnect_ms)) return file;
+  close(file);
+  return -1;
+}
+
+bool answered(int file, const Bytes& wanted) {
+  Bytes seen;
+  while (seen.n < sizeof seen.of && within(file, POLLIN, kAnswer_ms)) {
+    const ssize_t n = read(file, seen.of + seen.n, sizeof seen.of - seen.n);
+    if (n <= 0) return false;
+    seen.n += static_cast<size_t>(n);
+    if (memmem(seen.of, seen.n, wanted.of, wanted.n) != nullptr) return true;
+  }
+  return false;
+}
+
+/// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.
+bool say(const Word& word) {
+  for (int attempt = 0; attempt < kTries; ++attempt) {
+    const bool serial = strcmp(word.wire, "serial") == 0, udp = strcmp(word.wire, "udp") == 0;
+    const int file = serial ? opened_serial(word) : opened_socket(word, udp ? SOCK_DGRAM : SOCK_STREAM);
+    if (file < 0) {
+      poll(nullptr, 0, kQuiet_ms);
+      continue;
+    }
+    const bool sent = write(file, word.bytes.of, word.bytes.n) == static_cast<ssize_t>(word.bytes.n);
+    const bool done = sent && (word.answer.n == 0 || answered(file, word.answer));
+    close(file);
+    if (done) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  for (const int sent : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU}) signal(sent, SIG_IGN);
+  syscall(SYS_close_range, 3u, ~0u, 0u);  // what that program held: ports and locks, which its death must free
+  (void)!chdir("/");
+  char released = 0;
+  ssize_t n = 0;
+  do n = read(STDIN_FILENO, &released, 1);
+  while (n < 0 && errno == EINTR);
+  if (n == 1) return 0;
+
+  alarm(kTooLong_s);
+  int silent = 0;
+  for (int i = 1; i + kFieldsOfAWord <= count; i += kFieldsOfAWord) {
+    const Word word(arguments + i);
+    const bool done = say(word);
+    silent += !done;
+    fprintf(stderr, "kphi-sentinel: kphi has died; %s: %s\n", word.device,
+            !done                ? "DOES NOT ANSWER, switch it off by hand"
+            : word.answer.n == 0 ? "told to stop"
+                                 : "switched off");
+  }
+  return silent == 0 ? 0 : 1;
+}

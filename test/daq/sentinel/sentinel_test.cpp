@@ -1,0 +1,145 @@
+// The sentinel on every wire but the serial line, which end_to_end has: what is said when the program that started it
+// dies, and nothing when it ends. Its program is another process here, as always.
+#include "daq/sentinel/sentinel.hpp"
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <optional>
+#include <string>
+
+#include "base/error.hpp"
+#include "test/results/recordings.hpp"
+
+namespace kphi::daq {
+namespace sentinel_test {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using Wire = LastWord::Wire;
+
+constexpr int kPatience_ms = 20'000;
+
+bool readable(int file, int limit_ms = kPatience_ms) {
+  pollfd wanted{file, POLLIN, 0};
+  return ::poll(&wanted, 1, limit_ms) > 0;
+}
+
+/// A device on a free port of this computer.
+class Device {
+ public:
+  explicit Device(Wire wire)
+      : wire_(wire), socket_(::socket(AF_INET, wire == Wire::udp ? SOCK_DGRAM : SOCK_STREAM, 0)) {
+    sockaddr_in here{};
+    here.sin_family = AF_INET;
+    here.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof here;
+    EXPECT_EQ(::bind(socket_.number(), reinterpret_cast<sockaddr*>(&here), size), 0);
+    EXPECT_EQ(::getsockname(socket_.number(), reinterpret_cast<sockaddr*>(&here), &size), 0);
+    if (wire == Wire::tcp) {
+      EXPECT_EQ(::listen(socket_.number(), 8), 0);
+    }
+    port_ = ntohs(here.sin_port);
+  }
+  [[nodiscard]] LastWord word(std::string bytes, std::string answer = {}) const {
+    return {"device", wire_, "localhost", port_, std::move(bytes), std::move(answer)};
+  }
+  /// The next message; "" after a long silence. It is answered with `answer`.
+  [[nodiscard]] std::string heard(const std::string& answer = {}) const {
+    if (!readable(socket_.number())) return "";
+    const Descriptor connection(wire_ == Wire::tcp ? ::accept(socket_.number(), nullptr, nullptr) : -1);
+    const int from = wire_ == Wire::tcp ? connection.number() : socket_.number();
+    std::array<char, 64> bytes{};
+    if (!readable(from)) return "";
+    const ssize_t n = ::read(from, bytes.data(), bytes.size());
+    if (!answer.empty()) {
+      EXPECT_EQ(::write(from, answer.data(), answer.size()), static_cast<ssize_t>(answer.size()));
+    }
+    return {bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))};
+  }
+  [[nodiscard]] bool is_left_alone() const { return !readable(socket_.number(), 0); }
+
+ private:
+  Wire wire_;
+  Descriptor socket_;
+  std::uint16_t port_ = 0;
+};
+
+/// A program that starts a sentinel and ends by `end`; returns once it has ended. Its standard error is closed, since
+/// the sentinel would keep this test's own open.
+void let_a_program_end(const std::vector<LastWord>& words, void (*end)(Sentinel*)) {
+  const pid_t program = ::fork();
+  if (program == 0) {
+    ::close(STDERR_FILENO);
+    end(new Sentinel(words));
+    ::_exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(program, &status, 0), program);
+}
+
+void be_killed(Sentinel*) { ::raise(SIGKILL); }
+void leave_without_a_word(Sentinel*) { ::_exit(3); }
+void release(Sentinel* sentinel) { delete sentinel; }
+
+TEST(Sentinel, SaysTheLastWordsOfAProgramThatWasKilled) {
+  const Device box(Wire::udp), supply(Wire::tcp);
+  const std::string stop("\x12\x34\0\0\0\0\0\0", 8), off("\0\1\0\0\0\6\1\6\0\x12\0\0", 12);
+  let_a_program_end({box.word(stop), supply.word(off, off.substr(6))}, be_killed);
+  EXPECT_EQ(box.heard(), stop);
+  EXPECT_EQ(supply.heard(off), off);
+}
+
+TEST(Sentinel, SaysThemAlsoOfOneThatLeftWithoutAWord) {
+  const Device instrument(Wire::tcp);
+  let_a_program_end({instrument.word("OUTP OFF\n")}, leave_without_a_word);
+  EXPECT_EQ(instrument.heard(), "OUTP OFF\n");
+}
+
+TEST(Sentinel, RepeatsThemUntilTheyAreAcknowledged) {
+  const Device supply(Wire::tcp);
+  let_a_program_end({supply.word("off", "is off")}, be_killed);
+  EXPECT_EQ(supply.heard("busy"), "off");
+  EXPECT_EQ(supply.heard(), "off");
+  EXPECT_EQ(supply.heard("it is off"), "off");
+}
+
+TEST(Sentinel, GoesOnToTheNextDeviceWhenOneIsGone) {
+  std::optional<Device> gone(std::in_place, Wire::tcp);
+  const LastWord nowhere = gone->word("off", "off");
+  gone.reset();
+  const Device supply(Wire::tcp);
+  let_a_program_end({nowhere, supply.word("off", "off")}, be_killed);
+  EXPECT_EQ(supply.heard("off"), "off");
+}
+
+TEST(Sentinel, SaysNothingOfAProgramThatReleasesIt) {
+  const Device box(Wire::udp);
+  pid_t process = 0;
+  {
+    const Sentinel sentinel({box.word("stop")});
+    process = sentinel.process();
+  }
+  EXPECT_NE(::kill(process, 0), 0) << "still there";
+  let_a_program_end({box.word("stop")}, release);
+  EXPECT_TRUE(box.is_left_alone()) << "both sentinels have ended before";
+}
+
+TEST(Sentinel, ThatIsNotInstalledIsAnErrorWithTheNextMove) {
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", "/nowhere", 1);
+  EXPECT_THAT(results::test::error_of<DeviceError>([] { const Sentinel sentinel({}); }),
+              AllOf(HasSubstr("No such file"), HasSubstr("install kphi again")));
+  ::setenv("PATH", path.c_str(), 1);
+}
+
+}  // namespace sentinel_test
+}  // namespace kphi::daq

@@ -1,0 +1,91 @@
+// kill -9 at random instants of a campaign over the true transports: within a second the supply is off and the box
+// quiet, and the motor coasts within its module's time-out and 50 ms.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <fstream>
+#include <random>
+
+#include "test/end_to_end/running_bench.hpp"
+
+namespace kphi::test::sentinel_test {
+
+constexpr double kModuleCoasts_ms = 500 + 50;
+constexpr double kSoon_s = 1, kWholeRun_s = 9;     // from the start of the program into its second run
+constexpr int kKills = std::min(KPHI_KILLS, 100);  // of one bench
+constexpr auto kLimit = std::chrono::seconds(1);
+
+bool is_safe(const nlohmann::json& now) { return now["supply"]["output"] == false && now["streaming"] == false; }
+
+/// Of the sentinel that the program has started; 0: none yet.
+int sentinel_of(int program) {
+  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", program));
+  int child = 0;
+  return children >> child ? child : 0;
+}
+
+double resident_mb(int process) {
+  std::ifstream status(fmt::format("/proc/{}/status", process));
+  for (std::string word; status >> word;)
+    if (double kilobytes = 0; word == "VmRSS:" && status >> kilobytes) return kilobytes / 1024;
+  return 0;
+}
+
+class KilledWithPower : public testing::TestWithParam<int> {};  // a seed
+
+TEST_P(KilledWithPower, LeavesTheSupplyOffTheBoxQuietAndTheMotorCoasting) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  std::mt19937 random(static_cast<unsigned>(GetParam()));
+  std::uniform_real_distribution<double> instant_s(kSoon_s, kWholeRun_s);
+  std::vector<double> kills_ms;
+  double longest_s = 0, memory_mb = 0;
+  int powered = 0;
+  for (int kill = 0; kill < kKills; ++kill) {
+    Process run(bench.run_command());
+    const double at_s = 1e-3 * bench.time_ms() + instant_s(random);
+    ASSERT_TRUE(bench.await([&](const auto& now) { return now["bench_time_s"] > at_s; }));
+    if (const int sentinel = sentinel_of(run.pid())) memory_mb = std::max(memory_mb, resident_mb(sentinel));
+    powered += bench.status()["supply"]["output"] == true;
+    run.signal(SIGKILL);
+    const auto killed = std::chrono::steady_clock::now();
+    kills_ms.push_back(bench.time_ms());
+    ASSERT_TRUE(bench.await(is_safe)) << "kill " << kill << "\n" << bench.status().dump();
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - killed;
+    longest_s = std::max(longest_s, took.count());
+    EXPECT_EQ(run.wait(), 128 + SIGKILL) << "kill " << kill << "\n" << run.err();
+  }
+  EXPECT_LT(longest_s, std::chrono::duration<double>(kLimit).count());
+  EXPECT_LT(memory_mb, 3);
+  EXPECT_GT(powered, kKills / 4) << "enough of them with the supply on";
+  const Account account = bench.account();
+  for (const double at : kills_ms) EXPECT_EQ(account.stage_at(at + kModuleCoasts_ms), "coast") << at << " ms";
+  EXPECT_TRUE(account.ends_without_power());
+  fmt::print("{} kills, {} with power: all is off after {:.3f} s at most; the sentinel takes {:.1f} MB\n", kKills,
+             powered, longest_s, memory_mb);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, KilledWithPower, testing::Range(1, 1 + KPHI_KILLS / kKills));
+
+TEST(Sentinel, IsGoneAfterARunThatEnds) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  Process run(bench.run_command());
+  run.wait_for("step  1/");
+  const int sentinel = sentinel_of(run.pid());
+  ASSERT_GT(sentinel, 0);
+  EXPECT_EQ(run.wait(), 0) << run.err();
+  EXPECT_NE(::kill(sentinel, 0), 0) << "still there";
+  EXPECT_EQ(run.err().find("kphi-sentinel"), std::string::npos) << "it has nothing to say";
+}
+
+TEST(Sentinel, DoesNotMindWhatEndsItsProgramFromATerminal) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  Process run(bench.run_command());
+  run.wait_for("step  1/");
+  const int sentinel = sentinel_of(run.pid());
+  ASSERT_GT(sentinel, 0);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) EXPECT_EQ(::kill(sentinel, number), 0);
+  EXPECT_EQ(run.wait(), 0) << run.err();
+}
+
+}  // namespace kphi::test::sentinel_test
