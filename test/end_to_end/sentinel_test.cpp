@@ -52,6 +52,7 @@ TEST_P(KilledWithPower, LeavesTheSupplyOffTheBoxQuietAndTheMotorCoasting) {
     kills_ms.push_back(bench.time_ms());
     ASSERT_TRUE(bench.await(is_safe)) << "kill " << kill << "\n" << bench.status().dump();
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - killed;
+    ASSERT_TRUE(bench.await([](const auto& now) { return now["drive"]["mode"] == "coast"; }));
     longest_s = std::max(longest_s, took.count());
     EXPECT_EQ(run.wait(), 128 + SIGKILL) << "kill " << kill << "\n" << run.err();
   }
