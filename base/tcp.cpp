@@ -27,8 +27,9 @@ std::size_t TcpClient::carry_out(const char* step, Start&& start) {
   io_.restart();
   io_.run();
   if (error == boost::beast::error::timeout) throw TcpError(Cause::timeout, "no answer in time");
+  const bool refused = error == asio::error::connection_refused, reset = error == asio::error::connection_reset;
   if (error && error != asio::error::eof)
-    throw TcpError(error == asio::error::connection_refused ? Cause::refused : Cause::other, error.message());
+    throw TcpError(refused ? Cause::refused : reset ? Cause::reset : Cause::other, error.message());
   return count;
 }
 

@@ -13,7 +13,7 @@ namespace kphi {
 
 class TcpError : public std::runtime_error {
  public:
-  enum class Cause : std::uint8_t { unknown_name, refused, timeout, other };
+  enum class Cause : std::uint8_t { unknown_name, refused, timeout, reset, other };
   TcpError(Cause why, const std::string& words) : std::runtime_error(words), cause(why) {}
   Cause cause;
 };

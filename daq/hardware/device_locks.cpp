@@ -1,17 +1,24 @@
 #include "daq/hardware/device_locks.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <cctype>
+#include <cerrno>
+#include <chrono>
 #include <system_error>
+#include <thread>
 
 #include "base/error.hpp"
 #include "drivers/serial/port.hpp"
 
 namespace kphi::daq {
 namespace {
+
+constexpr std::chrono::seconds kSentinelSpeaks{5};
+constexpr std::chrono::milliseconds kAskAgain{20};
 
 /// The same for all users, root included: programs of other users must see the locks.
 std::filesystem::path lock_folder_of_host() {
@@ -21,14 +28,6 @@ std::filesystem::path lock_folder_of_host() {
   const bool for_all = std::filesystem::is_directory(found) &&
                        (found.permissions() & std::filesystem::perms::others_write) != std::filesystem::perms::none;
   return for_all ? usual : std::filesystem::path("/tmp");
-}
-
-std::filesystem::path file_of(const std::string& name) {
-  std::string safe = name;
-  for (char& c : safe) {
-    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
-  }
-  return lock_folder_of_host() / ("kphi_" + safe + ".lock");
 }
 
 /// Its address, or the name itself if it cannot be resolved.
@@ -64,10 +63,19 @@ std::string supply_name(const std::string& uri) {
   return "supply " + address_of(rest.substr(0, port)) + rest.substr(port);
 }
 
+/// The lock of a program that is dead is held by its sentinel, for as long as that speaks to the device.
+bool is_dead(const results::LockHolder& holder) {
+  return holder.pid != 0 && ::kill(holder.pid, 0) != 0 && errno == ESRCH;
+}
+
 results::FileLock take(const std::string& device) {
   try {
     results::LockHolder holder;
-    if (auto lock = results::FileLock::take(file_of(device), holder)) return std::move(*lock);
+    const auto give_up = std::chrono::steady_clock::now() + kSentinelSpeaks;
+    do {
+      if (auto lock = results::FileLock::take(lock_file(device), holder)) return std::move(*lock);
+      std::this_thread::sleep_for(kAskAgain);
+    } while (is_dead(holder) && std::chrono::steady_clock::now() < give_up);
     throw DeviceError(device, "lock", "in use by " + holder.words(),
                       holder.pid == 0 ? "wait for that program or stop it"
                                       : fmt::format("wait for it, or stop it with: kill -INT {}", holder.pid));
@@ -77,6 +85,14 @@ results::FileLock take(const std::string& device) {
 }
 
 }  // namespace
+
+std::filesystem::path lock_file(const std::string& name) {
+  std::string safe = name;
+  for (char& c : safe) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-') c = '_';
+  }
+  return lock_folder_of_host() / ("kphi_" + safe + ".lock");
+}
 
 std::vector<std::string> lock_names(const profiles::BenchConfig& config) {
   if (config.simulation && config.simulation->in_process) return {};

@@ -2,6 +2,7 @@
 // computer.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,11 @@ namespace kphi::daq {
 /// /dev/ttyUSB0", "supply 10.0.0.5:502". Empty for a bench inside the process.
 [[nodiscard]] std::vector<std::string> lock_names(const profiles::BenchConfig& config);
 
-/// Locks a bench's devices, while the result lives. Throws DeviceError with the program that uses one of them, and the
-/// next move.
+/// Of such a lock.
+[[nodiscard]] std::filesystem::path lock_file(const std::string& name);
+
+/// Locks a bench's devices, while the result lives. Waits for the sentinel of a program that was killed. Throws
+/// DeviceError with the program that uses one of them, and the next move.
 [[nodiscard]] std::vector<results::FileLock> lock_devices(const std::vector<std::string>& names);
 
 /// Locks a campaign's folder. Throws ConfigurationError with the program that uses it.

@@ -12,6 +12,7 @@
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/box.hpp"
 #include "daq/guard/run_stopped.hpp"
+#include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/sleep_inhibitor.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/netbox/configuration/http.hpp"
@@ -72,11 +73,16 @@ void require_no_stop(const std::function<bool()>& stop_asked) {
 }
 
 /// The box first: it is quick.
-std::vector<LastWord> last_words(const profiles::NetBoxConfig& box, const LiveSupply* supply) {
+std::vector<LastWord> last_words(const profiles::BenchConfig& config, const LiveSupply* supply) {
   const auto stop = netbox::encode_request(netbox::Command::stop);
+  const profiles::NetBoxConfig& box = config.netbox;
+  const std::vector<std::string> names = lock_names(config);  // box, motor, supply
   std::vector<LastWord> words{{"stream of the Net Box " + box.host, LastWord::Wire::udp, box.host, box.rdt_port,
                                std::string(stop.begin(), stop.end())}};
-  if (supply != nullptr && supply->off()) words.push_back(*supply->off());
+  words.front().lock = lock_file(names.front());
+  if (supply == nullptr || !supply->off()) return words;
+  words.push_back(*supply->off());
+  words.back().lock = lock_file(names.back());
   return words;
 }
 
@@ -216,7 +222,7 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
       air_(config.ambient, clock_),
       load_cell_(config.netbox, clock_, stop_asked),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
-      sentinel_(last_words(config.netbox, supply_.get())),
+      sentinel_(last_words(config, supply_.get())),
       power_(supply_to_switch_on(stop_asked)),
       motor_(config.iq, clock_) {}
 

@@ -1,13 +1,13 @@
 // kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
 // its end. Needs the C library alone, so that it is small and nothing in it can fail.
-// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER)…, bytes in hexadecimal digits. Its standard
-// input is the line to that program: a byte releases the sentinel, an end without one is a death.
+// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER LOCK)…, bytes in hexadecimal digits. Its
+// standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <termios.h>
@@ -22,7 +22,7 @@
 
 namespace {
 
-constexpr int kTries = 5, kFieldsOfAWord = 6;
+constexpr int kTries = 5, kFieldsOfAWord = 7, kMostWords = 8;
 constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700;
 constexpr unsigned kTooLong_s = 20;
 
@@ -47,12 +47,14 @@ struct Word {
         where(fields[2]),
         number(static_cast<unsigned>(strtoul(fields[3], nullptr, 10))),
         bytes(from_hex(fields[4])),
-        answer(from_hex(fields[5])) {}
+        answer(from_hex(fields[5])),
+        lock(fields[6]) {}
   const char* device;
   const char* wire;
   const char* where;
   unsigned number;
   Bytes bytes, answer;
+  const char* lock;
 };
 
 bool within(int file, short event, int limit_ms) {
@@ -121,6 +123,13 @@ bool answered(int file, const Bytes& wanted) {
   return false;
 }
 
+/// Takes the lock that its death has freed, before the next program can: that one waits. False: another one has it.
+bool takes(const char* lock) {
+  if (*lock == 0) return true;
+  const int file = open(lock, O_RDONLY | O_CLOEXEC);
+  return file < 0 || flock(file, LOCK_EX | LOCK_NB) == 0;  // held to the end of this process
+}
+
 /// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.
 bool say(const Word& word) {
   for (int attempt = 0; attempt < kTries; ++attempt) {
@@ -151,9 +160,13 @@ int main(int count, char** arguments) {
   if (n == 1) return 0;
 
   alarm(kTooLong_s);
+  const int words = (count - 1) / kFieldsOfAWord < kMostWords ? (count - 1) / kFieldsOfAWord : kMostWords;
+  bool free[kMostWords];
+  for (int i = 0; i < words; ++i) free[i] = takes(arguments[1 + kFieldsOfAWord * i + kFieldsOfAWord - 1]);
   int silent = 0;
-  for (int i = 1; i + kFieldsOfAWord <= count; i += kFieldsOfAWord) {
-    const Word word(arguments + i);
+  for (int i = 0; i < words; ++i) {
+    if (!free[i]) continue;
+    const Word word(arguments + 1 + kFieldsOfAWord * i);
     const bool done = say(word);
     silent += !done;
     fprintf(stderr, "kphi-sentinel: kphi has died; %s: %s\n", word.device,

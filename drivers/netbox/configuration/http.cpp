@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
@@ -31,25 +32,69 @@ void refuse_if_wrong(const boost::system::error_code& error) {
   throw error == http::error::body_limit ? kTooLong : kNotHttp;
 }
 
-http::response<http::string_body> read_response(TcpClient& box) {
+/// Behind the blank line that ends the head; npos: it is not there yet.
+std::size_t end_of_head(std::string_view answer) {
+  for (std::size_t at = answer.find('\n'); at != std::string_view::npos; at = answer.find('\n', at + 1)) {
+    if (answer.substr(at + 1).starts_with('\n')) return at + 2;
+    if (answer.substr(at + 1).starts_with("\r\n")) return at + 3;
+  }
+  return std::string_view::npos;
+}
+
+/// As the parser wants it, where web servers of small devices are terse: lines end with CRLF, the status with a reason,
+/// and no name of a header holds a blank.
+std::string in_strict_form(std::string_view head) {
+  std::string strict;
+  for (std::size_t begin = 0; begin < head.size();) {
+    const std::size_t end = head.find('\n', begin);
+    std::string_view line = head.substr(begin, end - begin);
+    begin = end + 1;
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    const bool status = strict.empty();
+    if (!status && line.substr(0, line.find(':')).find_first_of(" \t") != std::string_view::npos) continue;
+    strict.append(line);
+    if (status && std::ranges::count(line, ' ') == 1) strict += ' ';
+    strict += "\r\n";
+  }
+  return strict;
+}
+
+/// Appends what comes next; false: the end. A body without a length may end with a reset as well.
+bool receive(TcpClient& box, std::string& received, bool may_end) {
+  try {
+    return box.receive(received);
+  } catch (const TcpError& error) {
+    if (may_end && error.cause == TcpError::Cause::reset) return false;
+    throw;
+  }
+}
+
+/// The head in strict form, and the beginning of the body.
+std::string read_head(TcpClient& box) {
   constexpr std::string_view kScheme = "HTTP/";
+  std::string received;
+  std::size_t end = std::string::npos;
+  while (end == std::string::npos) {
+    if (received.size() > kHeadLimit) throw kNotHttp;
+    if (!box.receive(received)) throw kCutShort;
+    if (!kScheme.starts_with(received.substr(0, kScheme.size()))) throw kNotHttp;
+    end = end_of_head(received);
+  }
+  return in_strict_form(received.substr(0, end)) + received.substr(end);
+}
+
+http::response<http::string_body> read_response(TcpClient& box) {
   http::response_parser<http::string_body> parser;
   parser.header_limit(kHeadLimit);
   parser.body_limit(kBodyLimit);
-  std::string received;
-  while (!parser.is_done()) {
+  std::string received = read_head(box);
+  for (bool more = true; !parser.is_done(); more = parser.is_done() || receive(box, received, parser.need_eof())) {
     boost::system::error_code error;
-    if (box.receive(received)) {
-      // The parser would wait for the end of whatever this is.
-      if (!parser.got_some() && !kScheme.starts_with(received.substr(0, kScheme.size()))) throw kNotHttp;
-      do {
-        // Before the header is done: an eager parser goes past a length above the limit, and makes room for all of it.
-        parser.eager(parser.is_header_done());
-        received.erase(0, parser.put(boost::asio::buffer(received), error));
-      } while (!error && !received.empty() && !parser.is_done());
-    } else {
-      if (!parser.got_some()) throw kCutShort;
-      parser.put_eof(error);
+    if (!more) parser.put_eof(error);
+    while (!error && !received.empty() && !parser.is_done()) {
+      // Before the header is done: an eager parser goes past a length above the limit, and makes room for all of it.
+      parser.eager(parser.is_header_done());
+      received.erase(0, parser.put(boost::asio::buffer(received), error));
     }
     refuse_if_wrong(error);
     if (parser.get().body().size() > kBodyLimit) throw kTooLong;

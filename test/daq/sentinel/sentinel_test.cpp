@@ -3,9 +3,11 @@
 #include "daq/sentinel/sentinel.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <poll.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,6 +20,7 @@
 
 #include "base/error.hpp"
 #include "test/results/recordings.hpp"
+#include "test/temporary_folder.hpp"
 
 namespace kphi::daq {
 namespace sentinel_test {
@@ -131,6 +134,18 @@ TEST(Sentinel, SaysNothingOfAProgramThatReleasesIt) {
   EXPECT_NE(::kill(process, 0), 0) << "still there";
   let_a_program_end({box.word("stop")}, release);
   EXPECT_TRUE(box.is_left_alone()) << "both sentinels have ended before";
+}
+
+TEST(Sentinel, LeavesADeviceAloneThatAnotherProgramHasTaken) {
+  const test::TemporaryFolder folder;
+  const Descriptor lock(::open((folder / "lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+  ASSERT_EQ(::flock(lock.number(), LOCK_EX | LOCK_NB), 0);
+  const Device taken(Wire::udp), own(Wire::udp);
+  LastWord of_taken = taken.word("stop");
+  of_taken.lock = folder / "lock";
+  let_a_program_end({of_taken, own.word("stop")}, be_killed);
+  EXPECT_EQ(own.heard(), "stop");
+  EXPECT_TRUE(taken.is_left_alone()) << "it would have been told before";
 }
 
 TEST(Sentinel, ThatIsNotInstalledIsAnErrorWithTheNextMove) {

@@ -59,6 +59,7 @@ class FakeWeb {
     std::chrono::milliseconds before_each{0};
     bool keep_open = false;  ///< after the last piece, until the end of this object
     std::function<std::string(const std::string& request)> answer = nullptr;  ///< instead of the pieces
+    bool reset = false;  ///< ends with a reset behind the last piece
   };
 
   explicit FakeWeb(Manner manner) : manner_(std::move(manner)), socket_(SOCK_STREAM) {
@@ -100,6 +101,11 @@ class FakeWeb {
     for (const std::string& piece : manner_.pieces) {
       pause(manner_.before_each, end);
       if (send(client, piece.data(), piece.size(), MSG_NOSIGNAL) < 0) return;
+    }
+    if (manner_.reset) {
+      const linger at_once{1, 0};
+      setsockopt(client, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+      return;  // to be closed
     }
     shutdown(client, manner_.keep_open ? SHUT_RD : SHUT_WR);
     if (manner_.keep_open) pause(std::chrono::hours(1), end);

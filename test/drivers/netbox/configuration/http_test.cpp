@@ -34,6 +34,26 @@ TEST(HttpGet, TakesAnAnswerInPiecesAndWithoutALengthUpToTheEnd) {
     EXPECT_EQ(http_get("127.0.0.1", FakeWeb(manner).port(), "/", 10s), "<netft/>");
 }
 
+TEST(HttpGet, TakesWhatATerseWebServerSays) {
+  for (const char* answer : {"HTTP/1.0 200 OK\n\n<netft/>", "HTTP/1.0 200\r\n\r\n<netft/>", "HTTP/1.0 200\n\n<netft/>",
+                             "HTTP/1.0 200 OK\nContent-Length: 8\n\n<netft/>",
+                             "HTTP/1.0 200 OK\r\nContent Type: text/xml\r\nServer : box\r\n\r\n<netft/>"}) {
+    EXPECT_EQ(http_get("127.0.0.1", FakeWeb({{answer}}).port(), "/", 10s), "<netft/>") << answer;
+  }
+}
+
+TEST(HttpGet, AResetBehindTheBodyIsAnEnd) {
+  for (const char* answer :
+       {"HTTP/1.0 200 OK\r\n\r\n<netft/>", "HTTP/1.0 200 OK\r\nContent-Length: 8\r\n\r\n<netft/>"}) {
+    FakeWeb::Manner manner{{answer}};
+    manner.reset = true;
+    EXPECT_EQ(http_get("127.0.0.1", FakeWeb(manner).port(), "/", 10s), "<netft/>") << answer;
+  }
+  FakeWeb::Manner early{{"HTTP/1.0 200 OK\r\nContent-Length: 100\r\n\r\n<netft"}};
+  early.reset = true;
+  EXPECT_THAT(failure(FakeWeb(early).port()), HasSubstr("reset"));
+}
+
 TEST(HttpGet, NamesTheStatusOfARefusal) {
   FakeWeb missing(FakeWeb::page("no", "404 Not Found"));
   EXPECT_THAT(failure(missing.port()), AllOf(HasSubstr("Net Box 127.0.0.1:"), HasSubstr("GET /netftapi2.xml"),
@@ -56,7 +76,8 @@ TEST(HttpGet, WhatIsNoWholeAnswerIsNamed) {
            {{}, "could not read the answer: the connection ended early"},
            {{{cut}, 0ms, true}, "no answer within"},
            {{{"HTTP/1.0 200 OK\r\nContent-Length: 9999999999999999\r\n\r\nabc"}}, "the answer is longer than 1 MiB"},
-           {{{"SSH-2.0-OpenSSH_9.2\r\n\r\n"}}, "not a Net Box"}}) {
+           {{{"SSH-2.0-OpenSSH_9.2\r\n\r\n"}}, "not a Net Box"},
+           {{{"HTTP/1.0 200 OK\r\nX: " + std::string(9000, 'x')}}, "not a Net Box"}}) {
     const FakeWeb web(manner);
     EXPECT_THAT(failure(web.port(), manner.keep_open ? 50ms : 10s), HasSubstr(words));
   }
