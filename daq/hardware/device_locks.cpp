@@ -1,13 +1,12 @@
 #include "daq/hardware/device_locks.hpp"
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <cctype>
-#include <cerrno>
 #include <chrono>
+#include <fstream>
 #include <system_error>
 #include <thread>
 
@@ -63,9 +62,12 @@ std::string supply_name(const std::string& uri) {
   return "supply " + address_of(rest.substr(0, port)) + rest.substr(port);
 }
 
-/// The lock of a program that is dead is held by its sentinel, for as long as that speaks to the device.
+/// The lock of a program that is dead is held by its sentinel, for as long as that speaks to the device. One whose
+/// parent has not noticed is dead as well: it has no command line any more.
 bool is_dead(const results::LockHolder& holder) {
-  return holder.pid != 0 && ::kill(holder.pid, 0) != 0 && errno == ESRCH;
+  if (holder.pid == 0) return false;
+  std::ifstream command(fmt::format("/proc/{}/cmdline", holder.pid));
+  return command.peek() == std::ifstream::traits_type::eof();
 }
 
 results::FileLock take(const std::string& device) {

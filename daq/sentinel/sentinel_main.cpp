@@ -23,7 +23,7 @@
 namespace {
 
 constexpr int kTries = 5, kFieldsOfAWord = 7, kMostWords = 8;
-constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700;
+constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700, kLockFreed_ms = 100;
 constexpr unsigned kTooLong_s = 20;
 
 struct Bytes {
@@ -123,11 +123,16 @@ bool answered(int file, const Bytes& wanted) {
   return false;
 }
 
-/// Takes the lock that its death has freed, before the next program can: that one waits. False: another one has it.
+/// Takes the lock that its death frees, before the next program can: that one waits. The kernel frees it a little later
+/// than it ends the line. False: another program has it.
 bool takes(const char* lock) {
   if (*lock == 0) return true;
   const int file = open(lock, O_RDONLY | O_CLOEXEC);
-  return file < 0 || flock(file, LOCK_EX | LOCK_NB) == 0;  // held to the end of this process
+  for (int waited = 0; file >= 0 && flock(file, LOCK_EX | LOCK_NB) != 0; ++waited) {
+    if (waited == kLockFreed_ms) return false;
+    poll(nullptr, 0, 1);
+  }
+  return true;  // held to the end of this process
 }
 
 /// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.

@@ -1,7 +1,15 @@
 #include "daq/hardware/device_locks.hpp"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <future>
+#include <optional>
 
 #include "test/daq/bench_fixture.hpp"
 #include "test/refusal.hpp"
@@ -53,6 +61,20 @@ TEST(DeviceLocks, RefuseTheSecondAndSayWhoHasIt) {
       }),
       AllOf(HasSubstr(own_name("b")), HasSubstr(fmt::format("process {} (", ::getpid())), HasSubstr("kill -INT")));
   EXPECT_NO_THROW((void)lock_devices({own_name("c")})) << "what the refused one had taken is free again";
+}
+
+TEST(DeviceLocks, WaitForTheSentinelOfAProgramThatIsDead) {
+  const pid_t dead = ::fork();
+  if (dead == 0) ::_exit(0);
+  ASSERT_EQ(::waitpid(dead, nullptr, 0), dead);
+  const std::filesystem::path file = lock_file(own_name("d"));
+  std::ofstream(file) << fmt::format(R"({{"pid": {}, "command": "kphi run", "since": "2021-05-30T08:00:00Z"}})", dead);
+  std::optional<Descriptor> sentinel(std::in_place, ::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  ASSERT_EQ(::flock(sentinel->number(), LOCK_EX | LOCK_NB), 0);
+  auto next = std::async(std::launch::async, [] { return lock_devices({own_name("d")}).size(); });
+  EXPECT_EQ(next.wait_for(std::chrono::milliseconds(60)), std::future_status::timeout) << "it waits";
+  sentinel.reset();
+  EXPECT_EQ(next.get(), 1u);
 }
 
 TEST(FolderLock, RefusesTheSecondWriter) {
