@@ -92,9 +92,9 @@ TEST(SupplyModels, AreFoundByTheirId) {
   using Known = std::pair<std::uint16_t, const char*>;
   for (const auto& [id, model] :
        {Known{60061, "RD6006"}, Known{60062, "RD6006"}, Known{60065, "RD6006P"}, Known{60121, "RD6012"},
-        Known{60125, "RD6012P"}, Known{60181, "RD6018"}, Known{60241, "RD6024"}})
+        Known{60125, "RD6012P"}, Known{60181, "RD6018"}, Known{60241, "RD6024"}, Known{60301, "RD6030"}})
     EXPECT_EQ(name(id), model);
-  for (const int id : {0, 1200, 5005, 60059, 60066, 60130, 60301, 65535})
+  for (const int id : {0, 1200, 5005, 60059, 60066, 60130, 60299, 60310, 65535})
     EXPECT_EQ(name(static_cast<std::uint16_t>(id)), "unknown") << id;
 }
 
