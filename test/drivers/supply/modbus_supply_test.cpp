@@ -220,9 +220,9 @@ TEST_F(Riden, SilentAbsentOrOfAnotherModelIsNamed) {
 }
 
 TEST_F(Riden, OfUnknownModelIsRefusedAndLeftAlone) {
-  simulated.spoil(lasting(FaultKind::supply_reads_as, 0, 60301));
+  simulated.spoil(lasting(FaultKind::supply_reads_as, 0, 60991));
   EXPECT_THAT(what_of([&] { ModbusSupply(simulated.address(), clock, kShort); }),
-              AllOf(HasSubstr("unknown model: RD60xx register 0 is 60301"), HasSubstr("known are RD6006")));
+              AllOf(HasSubstr("unknown model: RD60xx register 0 is 60991"), HasSubstr("known are RD6006")));
   EXPECT_TRUE(simulated.truth().writes.empty());
 }
 

@@ -65,7 +65,7 @@ TEST(SupplyAddress, RefusesABaudRateThatLibmodbusWouldSilentlyReplace) {
 
 TEST(SupplyAddress, IsStrict) {
   for (const std::string query : {"?", "?baud", "?baud=9600&", "?baud=9600&baud=9600", "?slave=0", "?slave=255",
-                                  "?slave=+1", "?parity=E", "?model=RD6030"})
+                                  "?slave=+1", "?parity=E", "?model=RD6099"})
     EXPECT_NE(refusal("modbus-rtu:/dev/ttyUSB0" + query), "accepted") << query;
   for (const char* uri : {"", "modbus-rtu:", "modbus-rtu:ttyUSB0", "modbus-rtu:/", "modbus:/dev/ttyUSB0",
                           "MODBUS-RTU:/dev/ttyUSB0", "modbus-rtu:/dev/tty USB0", "modbus-tcp:", "modbus-tcp::502",

@@ -76,7 +76,7 @@ TEST(UdevRules, LetEachMatchedDeviceBeOpened) {
     EXPECT_THAT(line, testing::AllOf(testing::HasSubstr("MODE=\"0660\""), testing::HasSubstr("GROUP=\""),
                                      testing::HasSubstr("TAG+=\"uaccess\"")));
   }
-  EXPECT_EQ(matched, 5);
+  EXPECT_EQ(matched, 6);
 }
 
 TEST(UdevRules, MakeTheMotorsAdapterAnswerAtOnce) {
