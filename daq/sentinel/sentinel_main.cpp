@@ -69,8 +69,9 @@ speed_t speed_of(unsigned baud) {
   constexpr struct {
     unsigned baud;
     speed_t speed;
-  } kSpeeds[] = {{9600, B9600},     {19200, B19200},   {38400, B38400},   {57600, B57600}, {115200, B115200},
-                 {230400, B230400}, {460800, B460800}, {921600, B921600}, {2400, B2400},   {4800, B4800}};
+  } kSpeeds[] = {{9600, B9600},     {19200, B19200},   {38400, B38400},   {57600, B57600},
+                 {115200, B115200}, {230400, B230400}, {460800, B460800}, {921600, B921600},
+                 {1200, B1200},     {2400, B2400},     {4800, B4800}};
   for (const auto& one : kSpeeds)
     if (one.baud == baud) return one.speed;
   return B115200;

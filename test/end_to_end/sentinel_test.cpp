@@ -74,25 +74,29 @@ TEST_P(KilledWithPower, LeavesTheSupplyOffTheBoxQuietAndTheMotorCoasting) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, KilledWithPower, testing::Range(1, 1 + KPHI_KILLS / kKills));
 
-TEST(Sentinel, IsGoneAfterARunThatEnds) {
-  RunningBench bench(Manner{.time_scale = 4, .supply = true});
-  Process run(bench.run_command());
-  run.wait_for("step  1/");
-  const int sentinel = sentinel_of(run.pid());
-  ASSERT_GT(sentinel, 0);
-  EXPECT_EQ(run.wait(), 0) << run.err();
-  EXPECT_NE(::kill(sentinel, 0), 0) << "still there";
-  EXPECT_EQ(run.err().find("kphi-sentinel"), std::string::npos) << "it has nothing to say";
+/// A run whose motor turns.
+class Sentinel : public testing::Test {
+ protected:
+  Sentinel() {
+    run_.wait_for("step  1/");
+    sentinel_ = sentinel_of(run_.pid());
+  }
+  RunningBench bench_{Manner{.time_scale = 4, .supply = true}};
+  Process run_{bench_.run_command()};
+  int sentinel_ = 0;
+};
+
+TEST_F(Sentinel, IsGoneAfterARunThatEnds) {
+  ASSERT_GT(sentinel_, 0);
+  EXPECT_EQ(run_.wait(), 0) << run_.err();
+  EXPECT_NE(::kill(sentinel_, 0), 0) << "still there";
+  EXPECT_EQ(run_.err().find("kphi-sentinel"), std::string::npos) << "it has nothing to say";
 }
 
-TEST(Sentinel, DoesNotMindWhatEndsItsProgramFromATerminal) {
-  RunningBench bench(Manner{.time_scale = 4, .supply = true});
-  Process run(bench.run_command());
-  run.wait_for("step  1/");
-  const int sentinel = sentinel_of(run.pid());
-  ASSERT_GT(sentinel, 0);
-  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) EXPECT_EQ(::kill(sentinel, number), 0);
-  EXPECT_EQ(run.wait(), 0) << run.err();
+TEST_F(Sentinel, DoesNotMindWhatEndsItsProgramFromATerminal) {
+  ASSERT_GT(sentinel_, 0);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) EXPECT_EQ(::kill(sentinel_, number), 0);
+  EXPECT_EQ(run_.wait(), 0) << run_.err();
 }
 
 }  // namespace kphi::test::sentinel_test
