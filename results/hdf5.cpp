@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "base/error.hpp"
+#include "results/checked_heap.hpp"
 
 namespace kphi::results::hdf5 {
 namespace {
@@ -168,7 +169,7 @@ Handle own(hid_t id, const std::string& doing) {
 Handle create_file(const std::filesystem::path& path) {
   be_quiet();
   const Handle list = creation_list(H5P_FILE_CREATE, track_links);
-  const Handle access = own(H5Pcreate(H5P_FILE_ACCESS), path.string());
+  const Handle access = own(checked_access(), path.string());
   // 1.8: readable by every HDF5 since 2008, with checksums over its metadata.
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), path.string());
   return own(H5Fcreate(path.c_str(), H5F_ACC_EXCL, list.get(), access.get()), path.string() + ": create");
@@ -180,7 +181,8 @@ Handle open_file(const std::filesystem::path& path) {
   std::error_code none;
   if (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none))
     throw RecordError(path.string() + ": open: this is a folder, a pipe or a device; name a run file");
-  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), path.string() + ": open");
+  const Handle access = own(checked_access(), path.string() + ": open");
+  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), path.string() + ": open");
 }
 
 Handle create_group(const Handle& parent, const char* name) {

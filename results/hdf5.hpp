@@ -1,6 +1,6 @@
 // HDF5's C API behind handles that close themselves and errors that throw. Its automatic error print is off. Files are
 // made without time stamps, with metadata checksums and tracked creation order: the same calls give the same bytes.
-// hid_t appears only here and in run_writer. Debian's library is thread-safe; one object, one thread.
+// hid_t appears only here, in checked_heap and in run_writer. Debian's library is thread-safe; one object, one thread.
 #pragma once
 
 #include <hdf5.h>
