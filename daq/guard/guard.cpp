@@ -57,7 +57,8 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
       readings_(kReadingsRelayed, kAtOnce),
       supply_readings_(kSupplyReadingsRelayed, 16),
       polled_ns_(bench.clock().now().count()),
-      beat_ns_(polled_ns_.load()) {
+      beat_ns_(polled_ns_.load()),
+      recorded_ns_(polled_ns_.load()) {
   for (const GuardLimit& limit : table_) limits_[static_cast<std::size_t>(limit.watched)] = &limit;
   const Instant now = bench.clock().now();
   load_cell_stream_ = {limit_of(Watched::load_cell_age), now};
@@ -74,6 +75,7 @@ void Guard::poll() noexcept {
     take_marks();
     notice_sleep();  // first: it is the cause of whatever else is found
     judge_pause(bench_.clock().now());
+    judge_recorder(bench_.clock().now());
     (void)relay();
     shown_.publish(observer_.readings());
     const Instant now = bench_.clock().now();
@@ -210,6 +212,15 @@ void Guard::judge_pause(Instant now) {
   trip(std::move(found));
 }
 
+void Guard::judge_recorder(Instant now) {
+  if (spinning_) hold(Watched::recorder_pause, wall_seconds_since(recorded_ns_, now));
+}
+
+std::size_t Guard::take(std::span<LoadCellRecord> out) {
+  recorded_ns_ = bench_.clock().now().count();
+  return samples_.take(out);
+}
+
 void Guard::notice_sleep() noexcept {
   if (has_slept(bench_.clock())) trip(slept(bench_.clock()));
 }
@@ -223,6 +234,7 @@ void Guard::check(bool spinning) {
   notice_sleep();
   const Instant now = bench_.clock().now();
   judge_pause(now);
+  judge_recorder(now);
   const double unwatched = wall_seconds_since(polled_ns_, now);
   if (const GuardLimit* limit = limit_of(Watched::pause); spinning && limit != nullptr && unwatched > limit->value)
     trip({fmt::format("the guard was blocked for {:.2g} s while the motor was turning", unwatched)});
@@ -235,6 +247,7 @@ void Guard::check(bool spinning) {
 Observation Guard::observe(Instant now) const {
   Observation seen = daq::observe(shown_.read(), now, fresh_, bench_.clock());
   seen.judged[Watched::pause] = pause_s_;
+  if (spinning_) seen.judged[Watched::recorder_pause] = wall_seconds_since(recorded_ns_, now);
   seen.account = bench_.load_cell().account();
   return seen;
 }

@@ -8,6 +8,7 @@
 //   supply      every reading: its state, its settings, its meters
 //   silence     the age of each stream's newest element; twice, so that what waits in this computer's sockets is taken
 //   the runner  its heartbeat, first; the runner in turn checks the guard's
+//   the recorder its heartbeat; no disk keeps the motor turning while nothing is written
 //
 // From the sample that exceeds a limit to the order to coast: 5 ms of its own on a live bench, plus the window of the
 // means. Silence is found 25 ms after its patience, a rotor that does not follow after the times in speed_error.hpp.
@@ -44,7 +45,8 @@ class Guard final {
   bool relay();
 
   // The recorder's thread.
-  std::size_t take(std::span<LoadCellRecord> out) { return samples_.take(out); }
+  /// Also the recorder's heartbeat.
+  std::size_t take(std::span<LoadCellRecord> out);
   std::size_t take(std::span<MotorReading> out) { return readings_.take(out); }
   std::size_t take(std::span<SupplyReading> out) { return supply_readings_.take(out); }
   /// Events of load cell and motor.
@@ -91,6 +93,7 @@ class Guard final {
   void judge_status(const LoadCellRecord& sample);
   void judge_links();
   void judge_pause(Instant now);
+  void judge_recorder(Instant now);
   void judge_gap(const LoadCellRecord& sample);
   [[nodiscard]] double wall_seconds_since(std::int64_t at_ns, Instant now) const;
 
@@ -115,7 +118,7 @@ class Guard final {
   Published<Readings> shown_;
   std::atomic<bool> judging_{true}, spinning_{false};
   std::atomic<int> step_{-1};
-  std::atomic<std::int64_t> polled_ns_, beat_ns_;
+  std::atomic<std::int64_t> polled_ns_, beat_ns_, recorded_ns_;
   std::atomic<double> pause_s_{kUnknown};  ///< between the last two heartbeats while the motor turns
 };
 
@@ -144,8 +147,12 @@ class MotorEnable {
     }
     guard_.latch().check();
   }
-  /// Feeds the driver's watchdog.
-  void renew() noexcept { motor_.renew(); }
+  /// Renews the lease without which the driver coasts the motor: the runner is here, and the guard has seen progress of
+  /// streams and recorder. Throws as at() does.
+  void renew() {
+    guard_.check(true);
+    motor_.renew();
+  }
   /// Coasts, after a ramp if the settings ask for one; returns at once.
   void begin_stop(const iq::StopSettings& settings = {}) {
     motor_.begin_stop(settings);

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kSupplyPatience = 2;    // s; the supply is read eight times per second
 constexpr double kLongestPause = 0.4;    // s; the driver coasts the motor after 0.5 s
+constexpr double kRecorderPause = 5;     // s; what arrives meanwhile waits in memory, for at most 10 s
 constexpr double kMeterOfSupply = 1.02;  // a supply that limits its current shows a little more than its limit
 
 /// The tightest limit that was offered for each quantity.
@@ -75,6 +76,7 @@ void offer_own(Table& table, const profiles::BenchConfig& config) {
   offer(table, Watched::motor_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
   if (config.supply) offer(table, Watched::supply_age, kSupplyPatience, "kphi");
   offer(table, Watched::pause, kLongestPause, "kphi, while the motor turns");
+  offer(table, Watched::recorder_pause, kRecorderPause, "kphi, while the motor turns");
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ enum class Watched : std::uint8_t {
   motor_age,
   supply_age,
   pause,
+  recorder_pause,
   samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; this and the next two have no row
   sleep,            ///< of this computer, however short
   state,            ///< no quantity: trouble that a device reports
@@ -107,7 +108,7 @@ inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
     {Watched::coil_temperature, Source::motor, Sense::upper, "coil temperature", "°C", "coil_degc", "Coil",
      "let the motor cool; add limits.cooling to the campaign, or use shorter steps",
      Limit("coil_temperature_max_degc")},
-    // Wall time, while the motor turns; likewise the next three.
+    // Wall time, while the motor turns; likewise the next four.
     {Watched::load_cell_age, Source::load_cell, Sense::upper, "age of the newest load-cell sample", "s",
      "load_cell_age_s", "Cell silent", kCheckBox},
     {Watched::motor_age, Source::motor, Sense::upper, "age of the newest motor reading", "s", "motor_age_s",
@@ -116,6 +117,8 @@ inline constexpr std::array<GuardedQuantity, kWatchedCount> kQuantities{{
      "Supply silent", "check the supply's cable: `kphi devices`"},
     {Watched::pause, Source::runner, Sense::upper, "pause of kphi", "s", "pause_s", "Program silent",
      "close other programs; do not stop kphi with Ctrl-Z"},
+    {Watched::recorder_pause, Source::runner, Sense::upper, "pause of the recorder", "s", "recorder_pause_s",
+     "Recorder silent", "check the disk under --out: is it full, slow, or on a network?"},
 }};
 static_assert(
     [] {

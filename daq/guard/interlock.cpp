@@ -16,6 +16,8 @@ std::string words(const GuardLimit& limit, double value) {
   }
   if (limit.watched == Watched::pause)
     return fmt::format("kphi was blocked for {:.2g} s while the motor was turning", value);
+  if (limit.watched == Watched::recorder_pause)
+    return fmt::format("kphi could not write to the run file for {:.2g} s while the motor was turning", value);
   const std::string shown = limit.unit == "RPM" ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
   return fmt::format("{} {} {} is {} ({})", limit.name, shown, limit.unit, to_words(limit), limit.source);
 }

@@ -60,8 +60,9 @@ Subject subject_of(const results::RunRecording& recording) {
       subject.speed_max_rpm = std::max(subject.speed_max_rpm, to_rpm(RadPerSec(mark.speed_rad_s)));
   }
   subject.replay = true;
-  std::erase_if(subject.limits,
-                [](const GuardLimit& limit) { return limit.watched == Watched::pause; });  // not recorded
+  std::erase_if(subject.limits, [](const GuardLimit& limit) {
+    return row_of(limit.watched).source == Source::runner;
+  });  // not recorded
   return subject;
 }
 

@@ -263,11 +263,10 @@ void Sequence::hold(Duration duration, MotorEnable* spin) {
 void Sequence::tick(MotorEnable* spin) {
   if (stop_asked_()) throw Interrupted("stopped by request");
   recorder_.check_failure();
-  guard_.check(spin != nullptr);
+  spin ? spin->renew() : guard_.check(false);
   show_events();
   const Instant now = bench_.clock().now();
   seen_ = guard_.observe(now);
-  if (spin) spin->renew();
   position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
   progress_.tick(position_, seen_);
 }

@@ -95,7 +95,7 @@ std::vector<GuardLimit> limits() {
   std::vector<GuardLimit> table;
   for (std::size_t i = 0; i < daq::kWatchedCount; ++i) {
     const auto watched = static_cast<Watched>(i);
-    if (watched == Watched::motor_age || watched == Watched::pause) continue;
+    if (watched == Watched::motor_age || daq::row_of(watched).source == daq::Source::runner) continue;
     table.push_back({watched, "", 1e9, "", "", false});
   }
   return table;

@@ -93,13 +93,23 @@ class CoastingBench final : public WrappedBench {
     }
   }
 
+  /// The guard's first, then the recorder's.
+  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
+    const bool is_recorder = works_++ % 2 == 1;
+    return bench.run_periodically([this, is_recorder, work = std::move(work)] {
+      if (!is_recorder || !recorder_hangs) work();
+    });
+  }
+
   SpoiltMotor spoilt_motor{bench.motor()};
   std::unique_ptr<SpoiltSupply> spoilt_supply;
   /// Since then the bridge is open, or (its supply cut, the bus down to what the rotor itself induces) it carries less
   /// than kNothing.
   Instant coasts_at{0};
+  bool recorder_hangs = false;
 
  private:
+  int works_ = 0;
   bool coasts_ = true;
 };
 

@@ -294,6 +294,28 @@ TEST_F(GuardAlone, IsMissedByTheRunnerWhenItLooksNoMore) {
   EXPECT_EQ(bench_.queue_motor.coasted, 1);
 }
 
+TEST_F(GuardAlone, MissesTheRecorderOnlyWhileTheMotorTurns) {
+  const auto run = [&](int from_ms, int to_ms, bool spinning) {
+    for (int ms = from_ms; ms <= to_ms; ms += 10) {
+      bench_.time.set(milliseconds(ms));
+      sample(6, bench_.time.now());
+      reading(MotorChannel::speed, 0);
+      guard_.check(spinning);
+      guard_.poll();
+    }
+  };
+  run(0, 9000, false);
+  EXPECT_EQ(bench_.queue_motor.coasted, 0);
+  std::array<LoadCellRecord, 1> taken;
+  (void)guard_.take(taken);
+  run(9010, 14'000, true);
+  EXPECT_EQ(bench_.queue_motor.coasted, 0);
+  bench_.time.set(milliseconds(14'010));
+  EXPECT_THROW(guard_.check(true), SafetyStop) << "the runner finds it, too";
+  EXPECT_THAT(guard_.latch().trip()->reason, StartsWith("kphi could not write to the run file for 5 s"));
+  EXPECT_EQ(bench_.queue_motor.coasted, 1);
+}
+
 TEST_F(GuardAlone, LetsTheMotorGoWhenItsLinkIsDead) {
   bench_.queue_motor.lost = "motor: the serial port is gone";
   expect_trip("motor: the serial port is gone");

@@ -253,6 +253,9 @@ const Case kCases[] = {
      [](CoastingBench& bench, Instant now) { bench.spoilt_supply->silent_from = now; }, true},
     {"ProgramSilent", Watched::pause, "", nullptr, as_acted(milliseconds(400 - 10)), "kphi was blocked for 0.4",
      EventKind::guard_trip, [](CoastingBench& bench, Instant now) { bench.wait_until(now + milliseconds(600)); }},
+    {"RecorderSilent", Watched::recorder_pause, "", [](auto& campaign) { campaign.profile.dwell = Seconds(7); },
+     as_acted(seconds(5) - milliseconds(10)), "kphi could not write to the run file for 5 s", EventKind::guard_trip,
+     [](CoastingBench& bench, Instant) { bench.recorder_hangs = true; }},
     {"BoxError", Watched::state, "  - {at_s: 2.2, kind: status, bits: 0x88000000}\n", nullptr, at(milliseconds(2200)),
      "load cell: the Net Box reports .serial link communication error. .status 0x88000000. for 5.9 ms, so its samples "
      "cannot be trusted; check the cell's cable"},
