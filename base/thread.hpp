@@ -7,12 +7,19 @@
 #include <thread>
 #include <utility>
 
+#include "base/real_time.hpp"
+
 namespace kphi {
+
+struct ThreadRole {
+  const char* name;     ///< as `top -H` shows it, at most 15 letters
+  bool urgent = false;  ///< it asks for real-time priority
+};
 
 /// Starts `work` on a thread that blocks all signals. They are blocked before it exists, so it never has a moment
 /// without. Throws std::system_error when the system has no more threads.
 template <class Work>
-[[nodiscard]] std::thread start_thread(Work&& work) {
+[[nodiscard]] std::thread start_thread(const ThreadRole& role, Work&& work) {
   struct Blocked {
     Blocked() noexcept {
       sigset_t all;
@@ -23,7 +30,11 @@ template <class Work>
     sigset_t before;
   };
   const Blocked while_starting;
-  return std::thread(std::forward<Work>(work));
+  return std::thread([role, work = std::forward<Work>(work)]() mutable {
+    pthread_setname_np(pthread_self(), role.name);
+    if (role.urgent) real_time::ask();
+    work();
+  });
 }
 
 }  // namespace kphi

@@ -12,6 +12,7 @@
 
 #include "base/clock.hpp"
 #include "base/finding.hpp"
+#include "base/thread.hpp"
 #include "compensation/units.hpp"
 #include "drivers/ambient/air.hpp"
 #include "drivers/iq/session/stopping.hpp"
@@ -157,7 +158,7 @@ class Bench {
   /// Returns at bench time `when`, or a little later on a live bench.
   virtual void wait_until(Instant when) = 0;
   /// Calls `work` while the handle lives: from a thread of its own, or from within wait_until.
-  [[nodiscard]] virtual std::shared_ptr<void> run_periodically(std::function<void()> work) = 0;
+  [[nodiscard]] virtual std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) = 0;
   /// Writes the run files.
   [[nodiscard]] virtual results::FileLayer& files() = 0;
   /// How often the recorder syncs the run file, bench time.
@@ -172,6 +173,12 @@ class Bench {
   virtual void restore_power() = 0;
   /// Keeps this computer awake while the handle lives; `why_not` becomes one line if that is impossible.
   [[nodiscard]] virtual std::shared_ptr<void> keep_awake(std::string& why_not) {
+    why_not.clear();
+    return nullptr;
+  }
+  /// Gives the calling thread real-time priority while the handle lives, which must not compute for long; `why_not`
+  /// becomes one line if this computer grants none.
+  [[nodiscard]] virtual std::shared_ptr<void> keep_prompt(std::string& why_not) {
     why_not.clear();
     return nullptr;
   }

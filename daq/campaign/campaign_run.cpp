@@ -187,9 +187,9 @@ class CampaignRun {
       cool_down();
       if (config_.ambient.known() && !bench_.air())
         progress_.say("air: no current reading; air density of this run unknown");
-      const auto awake = keep_awake();
+      const auto awake = keep(&Bench::keep_awake, "may_sleep");
       const RunOrder order{campaign_, config_, *mounted_, capped, remaining_s, file};
-      accept(record_run(bench_, order, progress_, stop_asked_), planned);
+      accept(record(order), planned);
     } catch (...) {
       const auto cause = std::current_exception();
       note_the_end(results::kRunAborted, {{"run", file.filename().string()},
@@ -230,15 +230,21 @@ class CampaignRun {
     if (!config_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
   }
 
+  [[nodiscard]] RunResult record(const RunOrder& order) {
+    const auto prompt = keep(&Bench::keep_prompt, "may_be_late");
+    return record_run(bench_, order, progress_, stop_asked_);
+  }
+
   /// For as long as the handle lives; a refusal is reported once.
-  [[nodiscard]] std::shared_ptr<void> keep_awake() {
+  [[nodiscard]] std::shared_ptr<void> keep(std::shared_ptr<void> (Bench::*how)(std::string& why_not),
+                                           const char* event) {
     std::string why_not;
-    auto awake = bench_.keep_awake(why_not);
-    if (!why_not.empty() && !std::exchange(may_sleep_, true)) {
+    auto kept = (bench_.*how)(why_not);
+    if (!why_not.empty() && refused_.insert(event).second) {
       progress_.say(why_not);
-      note("may_sleep", {{"reason", why_not}});
+      note(event, {{"reason", why_not}});
     }
-    return awake;
+    return kept;
   }
 
   /// Waits for the coil while a RestGuard watches the motor at rest.
@@ -371,7 +377,7 @@ class CampaignRun {
   std::set<std::string> accepted_;  ///< names of files
   Instant accepted_at_{0};          ///< the last of them
   std::optional<MountConfirmation> mounted_;
-  bool may_sleep_ = false;  ///< the operator knows that nothing keeps this computer awake
+  std::set<std::string> refused_;  ///< what this computer does not grant, as far as the operator knows
   CampaignResult result_;
 };
 

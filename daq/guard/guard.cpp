@@ -13,6 +13,9 @@ constexpr double kRelayed = 10;  // s that the recorder may be behind
 constexpr std::size_t kReadingsRelayed = 16384;
 constexpr std::size_t kSupplyReadingsRelayed = 256;
 constexpr std::size_t kAtOnce = 1024;
+constexpr double kAbsence =
+    0.1;  // s that the computer did not run the guard: long enough to be why a device seems late
+constexpr double kAbsenceCounts = 1;  // s after it
 constexpr Duration kSecondCheckWall = std::chrono::milliseconds(20);
 constexpr double kPatienceAtRest = 0.5;  // s
 constexpr double kNoDerate = 0.9999;     // one count of the module's fix16 is 1.5e-5
@@ -74,6 +77,7 @@ void Guard::poll() noexcept {
   try {
     take_marks();
     notice_sleep();  // first: it is the cause of whatever else is found
+    notice_absence(bench_.clock().now());
     judge_pause(bench_.clock().now());
     judge_recorder(bench_.clock().now());
     (void)relay();
@@ -106,6 +110,7 @@ void Guard::trip(Trip trip) noexcept {
   if (!judging_ || latch_.trip() != nullptr) return;
   trip.noticed = bench_.clock().now();
   trip.step = step_;
+  name_absence(trip);
   if (!latch_.set(std::move(trip))) return;
   bench_.motor().emergency_stop();
   if (bench_.supply() != nullptr) bench_.supply()->cut();
@@ -219,6 +224,25 @@ void Guard::judge_recorder(Instant now) {
 std::size_t Guard::take(std::span<LoadCellRecord> out) {
   recorded_ns_ = bench_.clock().now().count();
   return samples_.take(out);
+}
+
+void Guard::notice_absence(Instant now) noexcept {
+  const double absent = wall_seconds_since(polled_ns_, now);
+  if (absent >= kAbsence) absence_.publish({now, absent});
+}
+
+/// A device that seems late or a rotor that seems to stray right after this computer was busy with other things is no
+/// fault of theirs. Called by the runner too, whose own thread is late then.
+void Guard::name_absence(Trip& trip) const {
+  const Absence absence = absence_.read();
+  const bool can_be_why = trip.watched == Watched::load_cell_age || trip.watched == Watched::motor_age ||
+                          trip.watched == Watched::supply_age || trip.watched == Watched::speed_error ||
+                          trip.watched == Watched::samples_missing ||
+                          (trip.link_failed && trip.source == Source::motor);
+  if (!can_be_why || absence.lasted_s < kAbsence) return;
+  if (wall_seconds_since(absence.ended.count(), trip.noticed) > kAbsenceCounts) return;
+  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absence.lasted_s, trip.reason);
+  trip.source = Source::computer;
 }
 
 void Guard::notice_sleep() noexcept {

@@ -83,6 +83,11 @@ class Guard final {
   [[nodiscard]] const GuardLimit* limit_of(Watched watched) const noexcept {
     return limits_[static_cast<std::size_t>(watched)];
   }
+  /// The computer did not run the guard's thread.
+  struct Absence {
+    Instant ended{0};
+    double lasted_s = 0;
+  };
   void trip(Trip trip) noexcept;
   void hold(Watched watched, double value);
   void take_marks();
@@ -92,6 +97,8 @@ class Guard final {
   void judge_silence(Stream& stream, Instant now, bool spinning);
   void judge_status(const LoadCellRecord& sample);
   void judge_links();
+  void notice_absence(Instant now) noexcept;
+  void name_absence(Trip& trip) const;
   void judge_pause(Instant now);
   void judge_recorder(Instant now);
   void judge_gap(const LoadCellRecord& sample);
@@ -119,6 +126,7 @@ class Guard final {
   std::atomic<bool> judging_{true}, spinning_{false};
   std::atomic<int> step_{-1};
   std::atomic<std::int64_t> polled_ns_, beat_ns_, recorded_ns_;
+  Published<Absence> absence_;
   std::atomic<double> pause_s_{kUnknown};  ///< between the last two heartbeats while the motor turns
 };
 

@@ -69,6 +69,8 @@ inline constexpr const char* kCheckLoad = "check propeller, occlusion and load c
 inline constexpr const char* kCheckRotor = "check for a blocked rotor, a loose propeller, a weak supply";
 inline constexpr const char* kCheckShort = "check for a blocked rotor and a short circuit";
 inline constexpr const char* kCheckVoltage = "check the supply, its leads and its limits";
+inline constexpr const char* kCheckComputer =
+    "close other programs, do not stop kphi with Ctrl-Z; `kphi devices` shows how late this computer is";
 inline constexpr const char* kCheckBox = "check the box's power and network cable: `kphi devices`";
 
 inline constexpr double kOvershoot = 1.05;  ///< a closed loop overshoots a little on every step

@@ -39,6 +39,7 @@ Trip passed(const GuardLimit& limit, double value) {
 }
 
 std::string next_move(const Trip& trip) {
+  if (trip.source == Source::computer && trip.watched != Watched::sleep) return kCheckComputer;
   if (trip.watched < Watched::samples_missing) return row_of(trip.watched).next_move;
   if (trip.watched == Watched::samples_missing) return kCheckBox;
   if (trip.watched == Watched::sleep)

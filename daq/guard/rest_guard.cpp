@@ -27,7 +27,7 @@ RestGuard::RestGuard(Bench& bench, bool motor_has_power)
       motor_has_power_(motor_has_power),
       begun_(bench.clock().now()),
       speed_at_ns_(begun_.count() - 1),
-      polling_(bench.run_periodically([this] { poll(); })) {}
+      polling_(bench.run_periodically({"guard at rest", true}, [this] { poll(); })) {}
 
 void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
   if (!motor_has_power_) return;

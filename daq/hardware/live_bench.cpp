@@ -3,16 +3,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <thread>
 
 #include "base/error.hpp"
+#include "base/real_time.hpp"
+#include "base/thread.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/box.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
+#include "daq/hardware/realtime_kit.hpp"
 #include "daq/hardware/sleep_inhibitor.hpp"
 #include "drivers/netbox/configuration/calinfo.hpp"
 #include "drivers/netbox/configuration/http.hpp"
@@ -85,6 +89,31 @@ std::vector<LastWord> last_words(const profiles::BenchConfig& config, const Live
   words.back().lock = lock_file(names.back());
   return words;
 }
+
+/// Before the first thread of a device starts.
+SteadyClock make_prompt(SteadyClock clock) {
+  real_time::ask_through(&ask_realtime_kit);
+  if (!kInstrumented) (void)real_time::lock_memory();
+  return clock;
+}
+
+class PeriodicThread {
+ public:
+  PeriodicThread(const ThreadRole& role, std::function<void()> work)
+      : work_(std::move(work)), thread_(start_thread(role, [this] { run(); })) {}
+  ~PeriodicThread() {
+    quit_ = true;
+    thread_.join();
+  }
+
+ private:
+  void run() {
+    for (; !quit_; std::this_thread::sleep_for(kDrainWall)) work_();
+  }
+  std::function<void()> work_;
+  std::atomic<bool> quit_{false};
+  std::thread thread_;  ///< last: it uses the members above
+};
 
 }  // namespace
 
@@ -218,7 +247,7 @@ std::string LiveLoadCell::failure() const {
 
 LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
     : config_(config),
-      clock_(config.simulation ? config.simulation->time_scale : 1.0),
+      clock_(make_prompt(SteadyClock(config.simulation ? config.simulation->time_scale : 1.0))),
       air_(config.ambient, clock_),
       load_cell_(config.netbox, clock_, stop_asked),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
@@ -238,18 +267,19 @@ std::shared_ptr<void> LiveBench::keep_awake(std::string& why_not) {
   return inhibitor;
 }
 
+std::shared_ptr<void> LiveBench::keep_prompt(std::string& why_not) {
+  auto scope = std::make_shared<real_time::Scope>();
+  why_not = priority_words(real_time::refusal());
+  return scope;
+}
+
 void LiveBench::wait_until(Instant when) {
   const Duration left = clock_.shrunk(when - clock_.now());
   if (left > Duration(0)) std::this_thread::sleep_for(left);
 }
 
-std::shared_ptr<void> LiveBench::run_periodically(std::function<void()> work) {
-  return std::make_shared<std::jthread>([work = std::move(work)](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      work();
-      std::this_thread::sleep_for(kDrainWall);
-    }
-  });
+std::shared_ptr<void> LiveBench::run_periodically(const ThreadRole& role, std::function<void()> work) {
+  return std::make_shared<PeriodicThread>(role, std::move(work));
 }
 
 Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }

@@ -90,13 +90,14 @@ class LiveBench final : public Bench {
   [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override;
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   [[nodiscard]] bool switch_off_power() override { return power_.off(motor_); }
   void restore_power() override { power_.restore(motor_, clock_); }
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
+  [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string& why_not) override;
 
  private:
   /// The last check before its output comes on. Throws Interrupted, SafetyStop.

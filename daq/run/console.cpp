@@ -162,7 +162,7 @@ void Console::put(int descriptor, std::string text, Worth worth) noexcept {
     const std::lock_guard lock(shared_->mutex);
     if (!shared_->has_thread) {
       // Without signals, SIGTTOU does not stop a program in the background either.
-      start_thread([shared = shared_] { write_on(shared); }).detach();
+      start_thread({"console"}, [shared = shared_] { write_on(shared); }).detach();
       shared_->has_thread = true;
     }
     shared_->stream(descriptor).queue.push(std::move(text), worth, ++shared_->order);

@@ -125,8 +125,8 @@ void find_cause(Guard& guard, Ended& ended) {
 /// When this returns, the motor coasts, and unless the run is complete the supply is off.
 Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& recorder) {
   Ended ended;
-  const auto guarding = bench.run_periodically([&] { guard.poll(); });
-  const auto draining = bench.run_periodically([&] { recorder.drain(); });
+  const auto guarding = bench.run_periodically({"guard", true}, [&] { guard.poll(); });
+  const auto draining = bench.run_periodically({"recorder"}, [&] { recorder.drain(); });
   try {
     sequence.run();
   } catch (...) {

@@ -217,7 +217,7 @@ void DeterministicBench::outlive(Instant when) {
   sim_->advance(when);
 }
 
-std::shared_ptr<void> DeterministicBench::run_periodically(std::function<void()> work) {
+std::shared_ptr<void> DeterministicBench::run_periodically(const ThreadRole&, std::function<void()> work) {
   const auto entry = work_.insert(work_.end(), std::move(work));
   return {nullptr, [this, entry](void*) { work_.erase(entry); }};
 }

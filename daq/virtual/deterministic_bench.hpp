@@ -56,7 +56,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
     return measured_air_ ? measured_air_->density() : air_.density();
   }
   void wait_until(Instant when) override;
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override;
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole&, std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::seconds(1); }
   void mounted(const std::string& propeller_id, double occlusion_deg) override;

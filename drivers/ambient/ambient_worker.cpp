@@ -9,7 +9,7 @@
 namespace kphi::ambient {
 
 AmbientWorker::AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm)
-    : open_(std::move(open)), clock_(clock), rhythm_(rhythm), thread_(start_thread([this] { run(); })) {}
+    : open_(std::move(open)), clock_(clock), rhythm_(rhythm), thread_(start_thread({"air"}, [this] { run(); })) {}
 
 AmbientWorker::~AmbientWorker() {
   {

@@ -12,7 +12,7 @@ Worker::Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_
       clock_(clock),
       period_(from_seconds(1 / looks_per_second)),
       identity_(supply_->identity()),
-      thread_(start_thread([this] { run(); })) {}
+      thread_(start_thread({"supply", true}, [this] { run(); })) {}
 
 Worker::~Worker() {
   {

@@ -15,7 +15,7 @@ bool blocks(int signal) {
 
 TEST(StartThread, BlocksEverySignalThereAndNoneHere) {
   bool interrupt = false, terminate = false, hangup = false;
-  start_thread([&] {
+  start_thread({"a test"}, [&] {
     interrupt = blocks(SIGINT);
     terminate = blocks(SIGTERM);
     hangup = blocks(SIGHUP);

@@ -32,7 +32,9 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   [[nodiscard]] daq::MotorLink& motor() override { return motor_; }
   [[nodiscard]] daq::LoadCellLink& load_cell() override { return *this; }
   void wait_until(Instant) override {}
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole&, std::function<void()>) override {
+    return nullptr;
+  }
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}

@@ -94,9 +94,9 @@ class CoastingBench final : public WrappedBench {
   }
 
   /// The guard's first, then the recorder's.
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override {
     const bool is_recorder = works_++ % 2 == 1;
-    return bench.run_periodically([this, is_recorder, work = std::move(work)] {
+    return bench.run_periodically(role, [this, is_recorder, work = std::move(work)] {
       if (!is_recorder || !recorder_hangs) work();
     });
   }

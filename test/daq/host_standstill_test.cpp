@@ -31,9 +31,9 @@ class SleepyBench final : public WrappedBench {
     }
     bench.wait_until(when);
   }
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override {
     work_.push_back(std::make_shared<std::function<void()>>(std::move(work)));
-    return bench.run_periodically([this, work = work_.back()] {
+    return bench.run_periodically(role, [this, work = work_.back()] {
       if (!asleep_) (*work)();
     });
   }

@@ -98,7 +98,9 @@ class QueueBench : public Bench, private LoadCellLink {
   [[nodiscard]] LoadCellLink& load_cell() override { return *this; }
   [[nodiscard]] SupplyLink* supply() override { return supply_link; }
   void wait_until(Instant when) override { time.set(when); }
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()>) override { return nullptr; }
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole&, std::function<void()>) override {
+    return nullptr;
+  }
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}

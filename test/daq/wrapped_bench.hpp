@@ -21,8 +21,8 @@ class WrappedBench : public Bench {
   [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
   void restore_power() override { bench.restore_power(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> work) override {
-    return bench.run_periodically(std::move(work));
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override {
+    return bench.run_periodically(role, std::move(work));
   }
   void wait_until(Instant when) override { bench.wait_until(when); }
 

@@ -37,7 +37,7 @@ Capture::Capture(const std::string& path)
     : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
   if (file_.number() < 0) throw DeviceError("capture " + path, "create", std::strerror(errno), "choose another file");
   waiting_.assign(kTitle, kTitle + sizeof kTitle - 1);
-  writer_ = start_thread([this] { run(); });
+  writer_ = start_thread({"motor capture"}, [this] { run(); });
 }
 
 Capture::~Capture() {

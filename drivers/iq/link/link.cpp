@@ -54,7 +54,7 @@ class Link {
         session_(stretched(settings, port_->device(), baud, clock)),
         suspended_(clock.suspended()) {
     if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
-    thread_ = start_thread([this] { run(); });
+    thread_ = start_thread({"motor", true}, [this] { run(); });
     try {
       wait_until_ready();
     } catch (...) {

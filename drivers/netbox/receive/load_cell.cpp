@@ -44,7 +44,7 @@ LoadCell::LoadCell(const Address& address, const Clock& clock)
       configuration_(parse_configuration(fetch_configuration(address, kHttpTimeout), "Net Box " + address.host)),
       socket_(address.host, address.rdt_port),
       connection_(configuration_, to_seconds(clock.stretched(1s))),
-      inquirer_(start_thread([this] { answer_questions(); })) {}
+      inquirer_(start_thread({"box inquiries"}, [this] { answer_questions(); })) {}
 
 LoadCell::~LoadCell() {
   stop();
@@ -63,7 +63,7 @@ void LoadCell::start() {
   stopping_ = false;
   order_wakeup_.clear();
   state_ = State::starting;
-  thread_ = start_thread([this] { run(); });
+  thread_ = start_thread({"load cell", true}, [this] { run(); });
   // The session ends this by itself: it either streams or gives up.
   state_.wait(State::starting);
   if (state_ != State::failed) return;

@@ -19,7 +19,7 @@ class RestingBench final : public QueueBench {
     if (speed) show(MotorChannel::speed, speed());
     if (work) work();
   }
-  [[nodiscard]] std::shared_ptr<void> run_periodically(std::function<void()> called) override {
+  [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole&, std::function<void()> called) override {
     work = std::move(called);
     return nullptr;
   }
