@@ -29,12 +29,6 @@ int set(int policy, int priority) noexcept {
   return sched_setscheduler(0, policy, &parameter) == 0 ? 0 : errno;
 }
 
-bool may_lock_everything() noexcept {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_MEMLOCK, &limit) != 0) return false;
-  return limit.rlim_cur == RLIM_INFINITY || geteuid() == 0;
-}
-
 }  // namespace
 
 void ask_through(Grantor somebody) noexcept { grantor = somebody; }
@@ -65,6 +59,12 @@ std::string refusal() {
   return refused;
 }
 
-bool lock_memory() noexcept { return may_lock_everything() && mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0; }
+bool may_lock_memory() noexcept {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_MEMLOCK, &limit) != 0) return false;
+  return limit.rlim_cur == RLIM_INFINITY || geteuid() == 0;
+}
+
+bool lock_memory() noexcept { return may_lock_memory() && mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0; }
 
 }  // namespace kphi::real_time

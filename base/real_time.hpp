@@ -37,6 +37,8 @@ class Scope {
   bool granted_;
 };
 
+/// Whether lock_memory() would be granted.
+[[nodiscard]] bool may_lock_memory() noexcept;
 /// Keeps every page that this process touches in memory, if it may lock as much as it likes; a smaller permission
 /// (RLIMIT_MEMLOCK) would make later allocations fail. True: done.
 bool lock_memory() noexcept;

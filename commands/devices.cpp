@@ -7,6 +7,7 @@
 #include "daq/bench/air_source.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/probe.hpp"
+#include "daq/hardware/wake_ups.hpp"
 #include "daq/run/run.hpp"
 #include "drivers/iq/service/probe.hpp"
 #include "drivers/netbox/receive/probe.hpp"
@@ -25,6 +26,7 @@ struct DevicesRequest {
   std::string campaign;
   bool json = false;
   std::optional<double> clock_gain_s;
+  double wake_ups_s = 10;
 };
 
 Json to_json(const netbox::Configuration& box) {
@@ -157,9 +159,15 @@ void print(const std::vector<DeviceAnswer>& answers, bool json) {
     return print_json(all);
   }
   for (const DeviceAnswer& answer : answers) {
-    fmt::print("{}: {}\n", answer.device, answer.answers ? "answers" : "does not answer");
+    const char* state = answer.answers ? "answers" : "does not answer";
+    fmt::print("{}: {}\n", answer.device, answer.says.empty() ? state : answer.says);
     for (const std::string& line : answer.lines) fmt::print("  {}\n", printable(line));
   }
+}
+
+WakeUps wake_ups(double seconds) {
+  fmt::print(stderr, "kphi: looking {:g} s how late this computer wakes it\n", seconds);
+  return measure_wake_ups(seconds);
 }
 
 ExitCode devices(const DevicesRequest& asked) {
@@ -188,6 +196,7 @@ ExitCode devices(const DevicesRequest& asked) {
   }
   if (bench) ask_about_air(*bench, answers);
   for (DeviceAnswer& answer : ask_usb(answers)) answers.push_back(std::move(answer));
+  if (bench && asked.wake_ups_s > 0) answers.push_back(answer_of(wake_ups(asked.wake_ups_s), *bench));
   print(answers, asked.json);
   if (!bench) fmt::print(stderr, "kphi: no bench file, so only the Net Box's factory address was tried; use --bench\n");
   for (const DeviceAnswer& answer : answers)
@@ -213,6 +222,10 @@ void add_devices(CLI::App& program, ExitCode& exit_code) {
             "campaign file: check that the box's rate and ranges suit its speeds")
       ->needs(bench)
       ->check(kExistingFile);
+  add_value(command, "--wake-ups", "SECONDS", asked.wake_ups_s,
+            "measure how late this computer wakes kphi, for SECONDS; 0: not")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 3600.0));
   command.add_flag("--json", asked.json, "print one JSON array");
 }
 

@@ -16,6 +16,7 @@ struct DeviceAnswer {
   std::vector<std::string> lines{};  ///< for a person
   nlohmann::ordered_json details{};
   bool wanted = true;  ///< named in the bench file
+  std::string says{};  ///< instead of "answers"
 
   void add(const std::vector<Finding>& findings);
 };

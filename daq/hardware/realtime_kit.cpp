@@ -35,10 +35,8 @@ std::string ask_realtime_kit(pid_t thread, int priority) {
 
 std::string priority_words(const std::string& refusal) {
   if (refusal.empty()) return "";
-  return fmt::format(
-      "other programs may delay kphi and so stop a run: no real-time priority ({}); write `@dialout - rtprio 20` into "
-      "/etc/security/limits.d/kphi.conf and log in again, or keep this computer idle",
-      refusal);
+  return fmt::format("other programs may delay kphi and so stop a run: no real-time priority ({}); {}", refusal,
+                     kGrantPriority);
 }
 
 }  // namespace kphi::daq

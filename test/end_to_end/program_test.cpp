@@ -44,8 +44,8 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
 
 TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {
   RunningBench bench;
-  const std::vector<std::string> command{kphi(),   "devices",      "--bench", bench.path("bench.yaml"),
-                                         "--json", "--clock-gain", "10"};
+  const std::vector<std::string> command{
+      kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--json", "--clock-gain", "10"};
   const json motor = json::parse(ran(command).out).at(1);
   EXPECT_EQ(motor.at("uid"), "002300064d4b501120343353");
   EXPECT_EQ(motor.at("firmware"), "speed 0.0.32");
@@ -61,7 +61,7 @@ TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
   Manner manner;
   manner.supply = true;
   RunningBench bench(manner);
-  const std::vector<std::string> command{kphi(), "devices", "--bench", bench.path("bench.yaml")};
+  const std::vector<std::string> command{kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml")};
   const json answers = json::parse(ran(joined(command, {"--json"})).out);
   EXPECT_EQ(answers.at(1).at("output"), false);
   EXPECT_EQ(answers.at(2).at("answers"), false) << "its module, which is not missed then";
@@ -113,7 +113,9 @@ TEST(Program, TakesTheBoxesBiasWhenTheCampaignSaysSo) {
 
 TEST(Program, RefusesARateThatFoldsStepsOfTheCampaignAndNamesThem) {
   RunningBench bench({8, 100, "  []\n"});
-  EXPECT_THAT(ran({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--campaign", bench.path("short.yaml")}).out,
+  EXPECT_THAT(ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--campaign",
+                   bench.path("short.yaml")})
+                  .out,
               HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
   EXPECT_THAT(ran(bench.run_command(), 2).err, HasSubstr("set the RDT output rate to 7000 Hz"));
   EXPECT_TRUE(!std::filesystem::exists(bench.path("results")) || std::filesystem::is_empty(bench.path("results")));

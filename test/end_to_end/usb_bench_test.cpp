@@ -43,7 +43,7 @@ class UsbBench : public OnVirtualBus {
     return {};
   }
   [[nodiscard]] Ended devices(const char* file, int exit_code = 0) const {
-    return ran({kphi(), "devices", "--bench", bench->path(file)}, exit_code);
+    return ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench->path(file)}, exit_code);
   }
 
   sim::TrueAir truth{21.37, 98'765, 0.43};
