@@ -5,6 +5,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -29,7 +31,33 @@ int set(int policy, int priority) noexcept {
   return sched_setscheduler(0, policy, &parameter) == 0 ? 0 : errno;
 }
 
+std::array<std::atomic<std::int64_t>, 64> sleepers{};  // when each wants to be awake, steady ns; 0: free
+
+std::int64_t steady_ns() noexcept { return std::chrono::steady_clock::now().time_since_epoch().count(); }
+
 }  // namespace
+
+Asleep::Asleep(std::chrono::nanoseconds wall) noexcept {
+  const std::int64_t due = steady_ns() + wall.count();
+  for (auto& slot : sleepers) {
+    std::int64_t free = 0;
+    if (!slot.compare_exchange_strong(free, due)) continue;
+    due_ns_ = &slot;
+    return;
+  }
+}
+
+Asleep::~Asleep() {
+  if (due_ns_ != nullptr) *due_ns_ = 0;
+}
+
+std::chrono::nanoseconds overdue() noexcept {
+  const std::int64_t now = steady_ns();
+  std::int64_t most = 0;
+  for (const auto& slot : sleepers)
+    if (const std::int64_t due = slot; due != 0) most = std::max(most, now - due);
+  return std::chrono::nanoseconds(most);
+}
 
 void ask_through(Grantor somebody) noexcept { grantor = somebody; }
 

@@ -4,6 +4,9 @@
 
 #include <sys/types.h>
 
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <string>
 
 namespace kphi::real_time {
@@ -36,6 +39,21 @@ class Scope {
  private:
   bool granted_;
 };
+
+/// The calling thread sleeps for at most `wall` while this lives, for others to see: a thread that is still asleep long
+/// afterwards was not run by the computer. Any thread.
+class Asleep {
+ public:
+  explicit Asleep(std::chrono::nanoseconds wall) noexcept;
+  ~Asleep();
+  Asleep(const Asleep&) = delete;
+  Asleep& operator=(const Asleep&) = delete;
+
+ private:
+  std::atomic<std::int64_t>* due_ns_ = nullptr;  ///< null: as many as can be seen sleep already
+};
+/// By how much the most overdue sleeper of this process should have been awake; 0: none is late. Any thread.
+[[nodiscard]] std::chrono::nanoseconds overdue() noexcept;
 
 /// Whether lock_memory() would be granted.
 [[nodiscard]] bool may_lock_memory() noexcept;

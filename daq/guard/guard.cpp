@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/real_time.hpp"
 #include "daq/bench/device_records.hpp"
 
 namespace kphi::daq {
@@ -231,17 +232,19 @@ void Guard::notice_absence(Instant now) noexcept {
   if (absent >= kAbsence) absence_.publish({now, absent});
 }
 
-/// A device that seems late or a rotor that seems to stray right after this computer was busy with other things is no
-/// fault of theirs. Called by the runner too, whose own thread is late then.
+/// A device that seems late or a rotor that seems to stray while this computer is busy with other things, or right
+/// after it, is no fault of theirs. Called by the runner too, whose own thread is late then.
 void Guard::name_absence(Trip& trip) const {
-  const Absence absence = absence_.read();
   const bool can_be_why = trip.watched == Watched::load_cell_age || trip.watched == Watched::motor_age ||
                           trip.watched == Watched::supply_age || trip.watched == Watched::speed_error ||
                           trip.watched == Watched::samples_missing ||
                           (trip.link_failed && trip.source == Source::motor);
-  if (!can_be_why || absence.lasted_s < kAbsence) return;
-  if (wall_seconds_since(absence.ended.count(), trip.noticed) > kAbsenceCounts) return;
-  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absence.lasted_s, trip.reason);
+  if (!can_be_why) return;
+  const Absence past = absence_.read();
+  const bool counts = wall_seconds_since(past.ended.count(), trip.noticed) <= kAbsenceCounts;
+  const double absent = std::max(counts ? past.lasted_s : 0.0, to_seconds(real_time::overdue()));
+  if (absent < kAbsence) return;
+  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absent, trip.reason);
   trip.source = Source::computer;
 }
 

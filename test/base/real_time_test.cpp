@@ -97,6 +97,22 @@ TEST_F(RealTime, GoesToTheThreadsThatAreUrgent) {
   }
 }
 
+TEST(Asleep, IsSeenByOthersOnceItIsOverdue) {
+  EXPECT_EQ(real_time::overdue().count(), 0);
+  {
+    const real_time::Asleep long_since(-std::chrono::seconds(2)), not_yet(std::chrono::hours(1));
+    EXPECT_GE(real_time::overdue(), std::chrono::seconds(2));
+    EXPECT_LT(real_time::overdue(), std::chrono::seconds(60));
+  }
+  EXPECT_EQ(real_time::overdue().count(), 0);
+}
+
+TEST(Asleep, BeyondWhatCanBeSeenIsBorne) {
+  std::vector<std::unique_ptr<real_time::Asleep>> many;
+  for (int i = 0; i < 200; ++i) many.push_back(std::make_unique<real_time::Asleep>(std::chrono::hours(1)));
+  EXPECT_EQ(real_time::overdue().count(), 0);
+}
+
 TEST(StartThread, GivesItsName) {
   std::string name(16, '\0');
   start_thread({"load cell"}, [&] { pthread_getname_np(pthread_self(), name.data(), name.size()); }).join();

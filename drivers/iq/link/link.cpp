@@ -148,6 +148,7 @@ class Link {
     const timespec limit = to_timespec(left);
     pollfd fds[2] = {{motor_.commanded_.descriptor(), POLLIN, 0}, {-1, 0, 0}};
     if (port_) fds[1] = {port_->fd(), static_cast<short>(congested_ ? POLLIN | POLLOUT : POLLIN), 0};
+    const real_time::Asleep asleep(left);
     if (ppoll(fds, 2, &limit, nullptr) <= 0) return {};
     return {fds[0].revents != 0 && motor_.commanded_.clear(), fds[1].revents != 0};
   }

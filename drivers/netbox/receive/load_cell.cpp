@@ -36,6 +36,11 @@ bool poll_for(std::span<pollfd> descriptors, std::chrono::nanoseconds wall) noex
   return ppoll(descriptors.data(), descriptors.size(), &timeout, nullptr) > 0;
 }
 
+void sleep_for(Duration wall) {
+  const real_time::Asleep asleep(wall);
+  std::this_thread::sleep_for(wall);
+}
+
 }  // namespace
 
 LoadCell::LoadCell(const Address& address, const Clock& clock)
@@ -139,10 +144,12 @@ void LoadCell::wait_for_datagrams() noexcept {
   const bool gathers = drained_ > 0 && connection_.state() == State::streaming;
   const Instant now = clock_.now();
   if (const auto wall = gathers ? clock_.shrunk(connection_.gathering_time(now)) : 0ns; wall > 0ns)
-    return std::this_thread::sleep_for(wall);
+    return sleep_for(wall);
   std::array<pollfd, 2> both{{{order_wakeup_.descriptor(), POLLIN, 0}, {socket_.descriptor(), POLLIN, 0}}};
   const Instant due = connection_.deadline();
-  poll_for(both, due == kNever ? 1h : clock_.shrunk(due - now));
+  const Duration wall = due == kNever ? 1h : clock_.shrunk(due - now);
+  const real_time::Asleep asleep(wall);
+  poll_for(both, wall);
   if (both[0].revents != 0) order_wakeup_.clear();
 }
 
