@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <optional>
 
+#include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "daq/audit/bench_audit.hpp"
@@ -47,11 +48,6 @@ std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<
         "with the answers (--answers FILE), or use --yes if the bench mounts by itself");
   }
   return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
-}
-
-bool has_terminal() {
-  const char* term = std::getenv("TERM");
-  return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
 }
 
 void summarise(const CampaignResult& result, const std::string& folder, bool json) {
@@ -114,22 +110,6 @@ void clear_safety_stop(Destination& destination, Operator& person, const std::op
     throw ConfigurationError(
         answers->path + ": continue_after_safety_stop is not needed: no safety stop ended this campaign; remove it");
   }
-}
-
-/// Refuses a computer that slept while it connected: the answers of the devices are outdated.
-std::unique_ptr<Bench> connect_awake(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked) {
-  const SteadyClock wall;
-  std::unique_ptr<Bench> bench;
-  try {
-    bench = connect(config, stop_asked);
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const std::exception&) {
-    require_awake(wall);
-    throw;
-  }
-  require_awake(wall);
-  return bench;
 }
 
 ExitCode print_finished(const Destination& destination, bool json) {

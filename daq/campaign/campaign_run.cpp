@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/error.hpp"
+#include "daq/campaign/at_the_stand.hpp"
 #include "daq/campaign/campaign_review.hpp"
 #include "daq/campaign/resume.hpp"
 #include "daq/guard/interlock.hpp"
@@ -288,22 +289,10 @@ class CampaignRun {
          {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
   }
 
-  /// Asks for the mounting only once the rotor is seen at rest, without power if kphi controls the supply. A RestGuard
-  /// watches all the time.
   MountConfirmation let_mount(double occlusion_deg) {
-    std::optional<RestGuard> guard(std::in_place, bench_, true);
-    guard->await_rest(stop_asked_);
-    const bool has_power = !bench_.switch_off_power();
-    if (!has_power) guard.emplace(bench_, false);
-    person_.while_waiting([&] { guard->check(); });
-    const MountConfirmation confirmed = person_.confirm_mounting(
-        campaign_.propeller, occlusion_deg,
-        has_power ? "The rotor is at rest and its module coasts, but the motor HAS POWER. Cut it at the switch first."
-                  : "The rotor is at rest and the supply's output is off.");
-    person_.while_waiting({});
-    guard->check();
-    if (stop_asked_()) throw Interrupted("stopped by request");
-    return confirmed;
+    return ask_at_the_stand(bench_, person_, stop_asked_, [&](const std::string& condition) {
+      return person_.confirm_mounting(campaign_.propeller, occlusion_deg, condition);
+    });
   }
 
   /// The file is complete, named and on disk: the journal's line accepts it. The tables are made from the files.

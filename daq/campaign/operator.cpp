@@ -58,6 +58,18 @@ void Operator::clear_safety_stop(const std::string& reason) {
       reason));
 }
 
+void Operator::clear_stand(double, const std::string&) { throw NotMounted("nobody confirmed that the stand is clear"); }
+
+void TerminalOperator::clear_stand(double speed_rpm, const std::string& condition) {
+  ask(fmt::format(
+          "{}{}The propeller will turn at {:.0f} RPM. Is it tight, and is nobody and nothing near it? Step back.",
+          condition, condition.empty() ? "" : "\n", speed_rpm),
+      "Type go and press Enter, or q to stop:", "You typed \"{}\".\n", [](const std::string& answer) {
+        if (answer == "q") throw NotMounted("not confirmed that the stand is clear");
+        return answer == "go";
+      });
+}
+
 void AutoConfirmOperator::clear_safety_stop(const std::string& reason) {
   if (!clears_safety_stops_) Operator::clear_safety_stop(reason);
 }

@@ -42,6 +42,12 @@ class Operator {
     mount(propeller, occlusion_deg, condition);
     return MountConfirmation(occlusion_deg);
   }
+  /// Asks whether nobody and nothing is near the propeller, whatever is mounted, and returns once it is confirmed: the
+  /// other way to unlock the motor. Throws NotMounted. `speed_rpm` that it will turn at.
+  [[nodiscard]] MountConfirmation confirm_clear(double speed_rpm, const std::string& condition = {}) {
+    clear_stand(speed_rpm, condition);
+    return MountConfirmation(0);
+  }
   /// Shows what stopped the campaign and asks whether a person has looked at the stand since. Returns if it may
   /// continue; throws NotMounted if the person says no, ConfigurationError if there is nobody to ask.
   virtual void clear_safety_stop(const std::string& reason);
@@ -57,6 +63,7 @@ class Operator {
 
  protected:
   virtual void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) = 0;
+  virtual void clear_stand(double speed_rpm, const std::string& condition);
   void poll() const {
     if (poll_) poll_();
   }
@@ -83,6 +90,7 @@ class AutoConfirmOperator final : public Operator {
 
  protected:
   void mount(const profiles::Propeller&, double, const std::string&) override {}
+  void clear_stand(double, const std::string&) override {}
 
  private:
   const bool clears_safety_stops_;
@@ -101,6 +109,7 @@ class TerminalOperator final : public Operator {
 
  protected:
   void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) override;
+  void clear_stand(double speed_rpm, const std::string& condition) override;
 
  private:
   /// Asks until `accept` takes the answer; "q" at the end of the input. `about` explains the question and is printed

@@ -14,8 +14,7 @@ constexpr double kRelayed = 10;  // s that the recorder may be behind
 constexpr std::size_t kReadingsRelayed = 16384;
 constexpr std::size_t kSupplyReadingsRelayed = 256;
 constexpr std::size_t kAtOnce = 1024;
-constexpr double kAbsence =
-    0.1;  // s that the computer did not run the guard: long enough to be why a device seems late
+constexpr double kAbsence = 0.05;     // s not run by this computer: long enough to be why a device seems late
 constexpr double kAbsenceCounts = 1;  // s after it
 constexpr Duration kSecondCheckWall = std::chrono::milliseconds(20);
 constexpr double kPatienceAtRest = 0.5;  // s
@@ -44,11 +43,11 @@ double speed_share(const std::vector<GuardLimit>& limits) {
 }  // namespace
 
 Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
-             const std::vector<GuardLimit>& limits)
+             const std::vector<GuardLimit>& limits, int blades)
     : bench_(bench),
       supply_(config.supply),
       table_(limits),
-      observer_({config.thrust_axis, config.thrust_sign, config.iq.spin}, scale,
+      observer_({config.thrust_axis, config.thrust_sign, config.iq.spin, blades}, scale,
                 SpeedWatch(config.iq.spin, bench.clock().stretched(host_delay(config)), speed_share(limits)),
                 [this](Watched watched, double value) { hold(watched, value); }),
       status_watch_(bench.load_cell().configuration().kind, bench.load_cell().configuration().records_per_datagram,
@@ -227,9 +226,13 @@ std::size_t Guard::take(std::span<LoadCellRecord> out) {
   return samples_.take(out);
 }
 
+/// Of the guard's own thread, or of one that talks to a device.
 void Guard::notice_absence(Instant now) noexcept {
-  const double absent = wall_seconds_since(polled_ns_, now);
-  if (absent >= kAbsence) absence_.publish({now, absent});
+  const double absent = std::max(wall_seconds_since(polled_ns_, now), to_seconds(real_time::overdue()));
+  if (absent < kAbsence) return;
+  const Absence past = absence_.read();
+  const bool counts = wall_seconds_since(past.ended.count(), now) <= kAbsenceCounts;
+  absence_.publish({now, std::max(absent, counts ? past.lasted_s : 0.0)});
 }
 
 /// A device that seems late or a rotor that seems to stray while this computer is busy with other things, or right
@@ -240,11 +243,10 @@ void Guard::name_absence(Trip& trip) const {
                           trip.watched == Watched::samples_missing ||
                           (trip.link_failed && trip.source == Source::motor);
   if (!can_be_why) return;
-  const Absence past = absence_.read();
-  const bool counts = wall_seconds_since(past.ended.count(), trip.noticed) <= kAbsenceCounts;
-  const double absent = std::max(counts ? past.lasted_s : 0.0, to_seconds(real_time::overdue()));
-  if (absent < kAbsence) return;
-  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absent, trip.reason);
+  const Absence absence = absence_.read();
+  if (absence.lasted_s < kAbsence) return;
+  if (wall_seconds_since(absence.ended.count(), trip.noticed) > kAbsenceCounts) return;
+  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absence.lasted_s, trip.reason);
   trip.source = Source::computer;
 }
 

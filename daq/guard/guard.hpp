@@ -33,9 +33,9 @@ namespace kphi::daq {
 
 class Guard final {
  public:
-  /// Discards readings from before this run. The devices stream already.
+  /// Discards readings from before this run. The devices stream already. `blades` of the propeller; 0: unknown.
   Guard(Bench& bench, const profiles::BenchConfig& config, const results::LoadCellScale& scale,
-        const std::vector<GuardLimit>& limits);
+        const std::vector<GuardLimit>& limits, int blades = 0);
 
   /// Takes what the devices have, judges and publishes it; coasts the motor after a trip. The guard's thread calls it
   /// periodically.

@@ -69,6 +69,7 @@ void Observer::tell(Watched watched, double value) {
 void Observer::take(const LoadCellRecord& sample) {
   newest_.load_cell_ns = sample.arrival_ns;
   load_.add(sample);
+  if (vibration_.add(sample.counts, newest_.speed_rad_s)) newest_.vibration = vibration_.newest();
   for (std::size_t axis = 0; axis < 6; ++axis) tell(static_cast<Watched>(axis), load_.load(axis));
   if (!load_.full()) return;
   newest_.thrust_n = load_.thrust() - thrust_zero_;

@@ -12,6 +12,7 @@
 #include "compensation/units.hpp"
 #include "daq/guard/guard_limits.hpp"
 #include "daq/guard/speed_error.hpp"
+#include "daq/guard/vibration.hpp"
 #include "results/records.hpp"
 
 namespace kphi::daq {
@@ -37,6 +38,7 @@ struct Readings {
   std::uint64_t fault_bits = 0;                ///< of power_safety.fault_now
   Nanoseconds load_cell_ns = 0, motor_ns = 0;  ///< bench time of the newest
   SupplyReading supply{};                      ///< time 0: none yet, or there is no supply
+  Vibration vibration{};                       ///< of the newest half second
 };
 
 /// Oldest sample and reading that count as fresh, bench time: the stream's and this computer's delay.
@@ -60,9 +62,10 @@ struct Observation : Readings {
 
 /// How thrust is read off the six axes, and which way the motor turns.
 struct Mounting {
-  int axis = 2;   ///< 0..2 = Fx, Fy, Fz
-  int sign = +1;  ///< of the axis when the propeller pulls
-  int spin = +1;  ///< +1 counter-clockwise
+  int axis = 2;    ///< 0..2 = Fx, Fy, Fz
+  int sign = +1;   ///< of the axis when the propeller pulls
+  int spin = +1;   ///< +1 counter-clockwise
+  int blades = 0;  ///< 0: unknown
 };
 
 /// The load on the cell from every sample; a single outlier is rejected: each axis goes through a median of three,
@@ -106,7 +109,12 @@ class Observer {
   using Judge = std::function<void(Watched, double value)>;
 
   Observer(const Mounting& mounting, const results::LoadCellScale& scale, const SpeedWatch& speed, Judge judge = {})
-      : mounting_(mounting), load_(mounting, scale), speed_(speed), judge_(std::move(judge)) {}
+      : mounting_(mounting),
+        load_(mounting, scale),
+        vibration_(mounting.axis, mounting.blades, scale.sample_rate_hz, scale.counts_per_newton,
+                   scale.counts_per_newton_metre),
+        speed_(speed),
+        judge_(std::move(judge)) {}
 
   /// Ages count from `now` until the first sample and reading.
   void begin(Instant now) noexcept { newest_.load_cell_ns = newest_.motor_ns = now.count(); }
@@ -131,6 +139,7 @@ class Observer {
 
   const Mounting mounting_;
   LoadWatch load_;
+  VibrationMeter vibration_;
   SpeedWatch speed_;
   Judge judge_;
   Readings newest_;

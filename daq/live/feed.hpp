@@ -1,4 +1,4 @@
-// From the runner to the live view, and one word back. The runner never waits: a tick replaces the one before, a
+// From the runner to the live view, and a few words back. The runner never waits: a tick replaces the one before, a
 // message without room is dropped and counted.
 #pragma once
 
@@ -6,10 +6,12 @@
 #include <boost/lockfree/spsc_queue.hpp>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 
 #include "base/published.hpp"
 #include "daq/live/messages.hpp"
+#include "daq/run/steering.hpp"
 
 namespace kphi::daq::live {
 
@@ -41,11 +43,19 @@ class Feed {
   bool ask_stop() noexcept { return !stop_.exchange(true); }
   /// Any thread: the runner checks it on every tick.
   [[nodiscard]] bool stop_asked() const noexcept { return stop_.load(); }
+  /// The server's thread. Dropped when there are more than anybody can press.
+  void press(Key key) noexcept { (void)keys_.push(key); }
+  /// The runner's thread: the oldest that was pressed.
+  [[nodiscard]] std::optional<Key> take_key() noexcept {
+    Key key{};
+    return keys_.pop(key) ? std::optional(key) : std::nullopt;
+  }
 
  private:
   Published<Tick> tick_;
   std::atomic<std::uint64_t> shown_{0}, dropped_{0};
   std::atomic<bool> stop_{false};
+  boost::lockfree::spsc_queue<Key, boost::lockfree::capacity<64>> keys_;
   boost::lockfree::spsc_queue<Message> messages_;  // sized at run time: see recorder.hpp
 };
 

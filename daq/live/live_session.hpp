@@ -69,6 +69,8 @@ class LiveSession {
   [[nodiscard]] std::string url() const { return server_ ? server_->url() : std::string(); }
   /// STOP was pressed on a page. Thread-safe.
   [[nodiscard]] bool stop_asked() const noexcept { return feed_.stop_asked(); }
+  /// A key that a page pressed. The runner's thread.
+  [[nodiscard]] std::optional<Key> take_key() noexcept { return feed_.take_key(); }
   /// A page is open. Thread-safe.
   [[nodiscard]] bool is_watched() const noexcept { return server_ && server_->clients() > 0; }
   /// A progress for `behind` and the live view. `behind`, `clock` and this must outlive it.

@@ -55,7 +55,7 @@ ordered_json bars_of(const std::vector<GuardLimit>& limits) {
 
 std::string hello_message(const Subject& subject) {
   ordered_json hello{{"type", "hello"}, {"format", "kphi-live/2"}, {"limits", bars_of(subject.limits)}};
-  KPHI_JSON_MEMBERS(hello, subject, replay, name, propeller, speed_max_rpm);
+  KPHI_JSON_MEMBERS(hello, subject, replay, by_hand, name, propeller, speed_max_rpm);
   return text_of(hello);
 }
 
@@ -73,6 +73,9 @@ std::string tick_message(const Tick& tick, double silent_s, std::uint64_t droppe
                        {"phase", at.step < 0 ? at.phase : std::string_view()}};
   KPHI_JSON_MEMBERS(message, at, step, steps, occlusion_deg, repetition, repetitions);
   add_readings(message, tick);
+  for (const double rms : tick.seen.vibration.rms) message["vibration"].push_back(rounded(rms, 4));
+  message["blade_pass_hz"] = rounded(tick.seen.vibration.blade_pass_hz, 6);
+  message["blade_pass_n"] = rounded(tick.seen.vibration.blade_pass_n, 4);
   for (const GuardedQuantity& row : kQuantities)
     message["watched"][row.key] = rounded(tick.seen.judged[row.watched], 4);
   message["silent_s"] = rounded(silent_s);

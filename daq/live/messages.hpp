@@ -1,20 +1,22 @@
 // The messages for pages and plotters: one JSON object each. Units are in the keys; an unknown or stale number is null.
 //
-//   hello    once, first: format "kphi-live/2", replay (bool), name, propeller, speed_max_rpm, limits as in `limits`
-//   history  once, second: trace [[time_s, thrust_n, commanded_rpm, speed_rpm], …], messages [limits, step, line, stop,
+//   hello    once, first: format "kphi-live/2", replay (bool), by_hand (bool), name, propeller, speed_max_rpm, limits
+//   as in `limits` history  once, second: trace [[time_s, thrust_n, commanded_rpm, speed_rpm], …], messages [limits,
+//   step, line, stop,
 //            end, …]
 //   limits   the guard's limits from now on: limits [{key, name, unit, limit, lower (bool), source}]
 //   tick     30 times a second: time_s, progress (0 to 1), remaining_s, propeller, phase ("" in a step), step (0-based,
 //            -1 outside steps), steps, occlusion_deg, repetition (1-based), repetitions, commanded_rpm, speed_rpm,
 //            speed_age_s, thrust_n, thrust_age_s, torque_nm, module_v, module_a, supply_v, supply_a, coil_degc, derate,
-//            fault_bits, received, lost_network, lost_host, watched {key: value, …} of every guarded quantity,
-//            silent_s (since the runner's last tick), dropped (frames and messages that this page did not get)
+//            fault_bits, vibration [rms of Fx … Tz, N and N m], blade_pass_hz, blade_pass_n, received, lost_network,
+//            lost_host, watched {key: value, …} of every guarded quantity, silent_s (since the runner's last tick),
+//            dropped (frames and messages that this page did not get)
 //   step     a step is over: occlusion_deg, repetition, step, speed_rpm, speed2_rad2_s2, thrust_n, k_n_s2, u_k_n_s2, n
 //   line     a line of the log: time_s, text
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text
 //
-// A page sends a single message: "stop".
+// A page sends "stop"; where the motor is turned by hand also "up", "down", "hold".
 #pragma once
 
 #include <cstdint>
@@ -25,6 +27,7 @@
 #include "daq/guard/guard_limits.hpp"
 #include "daq/guard/observation.hpp"
 #include "daq/run/progress.hpp"
+#include "daq/run/steering.hpp"
 #include "profiles/campaign.hpp"
 
 namespace kphi::daq::live {
@@ -36,6 +39,7 @@ struct Subject {
   double speed_max_rpm = 0;        ///< of the profile: the top of the speed axis
   Seconds minimum_discard;         ///< at the start of every step, not averaged
   std::vector<GuardLimit> limits;  ///< until a guard publishes its own
+  bool by_hand = false;            ///< pages may press keys
 };
 
 /// `devices`: their reported limits; nullptr: limits of the files only.
@@ -64,6 +68,11 @@ struct Tick {
 };
 
 inline constexpr const char* kStopWord = "stop";
+struct SteeringWord {
+  std::string_view text;
+  Key key;
+};
+inline constexpr SteeringWord kSteeringWords[] = {{"up", Key::up}, {"down", Key::down}, {"hold", Key::hold}};
 
 /// Preliminary k of a step, right after it. The record uses the raw samples (results/reduction).
 struct StepFigures {

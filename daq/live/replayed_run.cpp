@@ -70,8 +70,9 @@ ReplayedRun::ReplayedRun(const results::RunRecording& recording, ManualClock& cl
     : recording_(recording),
       clock_(clock),
       motor_(recording.motor),
-      observer_({recording.header.thrust_axis, recording.header.thrust_sign, recording.header.spin},
-                recording.header.load_cell, SpeedWatch(recording.header.spin, Duration(0))) {
+      observer_(
+          {recording.header.thrust_axis, recording.header.thrust_sign, recording.header.spin, recording.header.blades},
+          recording.header.load_cell, SpeedWatch(recording.header.spin, Duration(0))) {
   std::ranges::stable_sort(motor_, {}, &MotorReading::time_ns);
   const auto& cell = recording.load_cell;
   if (!cell.empty()) {

@@ -5,6 +5,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <boost/algorithm/string/replace.hpp>
 #include <boost/asio/io_context.hpp>
@@ -89,6 +90,18 @@ struct Server::Impl {
       frame();
       arm();
     });
+  }
+
+  /// False: no word of a page.
+  bool obey(const std::string& word) {
+    if (word == kStopWord) {
+      stop_asked();
+      return true;
+    }
+    const auto* key = std::ranges::find(kSteeringWords, word, &SteeringWord::text);
+    if (!settings_.can_steer || key == std::end(kSteeringWords)) return false;
+    feed_.press(key->key);
+    return true;
   }
 
   void stop_asked() {
@@ -185,8 +198,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
       if (failed) return self->leave();
       const std::string word = beast::buffers_to_string(self->read_buffer_.data());
       self->read_buffer_.clear();
-      if (word != kStopWord) return self->drop();
-      self->impl_.stop_asked();
+      if (!self->impl_.obey(word)) return self->drop();
       self->read();
     });
   }

@@ -21,6 +21,7 @@ class Server {
     std::string page;                     ///< HTML; every "@NONCE@" in it becomes the nonce of its scripts and styles
     std::string hello;                    ///< hello_message
     bool can_stop = true;                 ///< false: "stop" is ignored
+    bool can_steer = false;               ///< "up", "down" and "hold" are keys
     std::chrono::milliseconds frame{33};  ///< between ticks; 0: only draw() sends one
     std::chrono::milliseconds patience{2000};       ///< with a client that does not read
     std::chrono::milliseconds request_limit{5000};  ///< for a whole request

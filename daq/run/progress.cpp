@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 
+#include <cmath>
+
 namespace kphi::daq {
 namespace {
 
@@ -53,18 +55,39 @@ std::string describe(const Position& position, const Observation& seen) {
          silence(seen);
 }
 
+std::string describe_by_hand(const Position& position, const Observation& seen) {
+  const auto known = [](bool is_known, const char* format, double value) {
+    return is_known ? fmt::format(fmt::runtime(format), value) : std::string("?");
+  };
+  const bool loaded = seen.load_cell_is_fresh();
+  const double watts = seen.judged[Watched::supply_voltage_low] * seen.judged[Watched::supply_current];
+  const Vibration& shakes = seen.vibration;
+  const double rms_n = std::hypot(shakes.rms[0], shakes.rms[1], shakes.rms[2]);
+  std::string words =
+      fmt::format("{:>5}{} RPM  thrust {:>6} N  torque {:>6} mN m  {:>4} W  shakes {} N rms",
+                  known(seen.motor_is_fresh(), "{:.0f}", to_rpm(seen.speed())),
+                  position.commanded > RadPerSec(0) ? fmt::format(" of {:5.0f}", to_rpm(position.commanded)) : "",
+                  known(loaded, "{:.3f}", seen.thrust_n), known(loaded, "{:.1f}", 1e3 * seen.torque_nm),
+                  known(seen.motor_is_fresh() && std::isfinite(watts), "{:.0f}", watts),
+                  known(std::isfinite(rms_n), "{:.2f}", rms_n));
+  if (std::isfinite(shakes.blade_pass_n))
+    words += fmt::format("  blades {:.3f} N at {:.0f} Hz", shakes.blade_pass_n, shakes.blade_pass_hz);
+  return (position.step < 0 && !position.phase.empty() ? fmt::format("{:<10}", position.phase) : "") + words +
+         silence(seen);
+}
+
 PrintedProgress::~PrintedProgress() { put(stream_, clearing(), Worth::live); }
 
 void PrintedProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
   if (!on_terminal_ || now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  put(stream_, fmt::format("\r{}\x1b[K", cut(describe(position, seen), width_of(stream_) - 1)), Worth::live);
+  put(stream_, fmt::format("\r{}\x1b[K", cut(words_(position, seen), width_of(stream_) - 1)), Worth::live);
   drawn_ = true;
 }
 
 void PrintedProgress::step_done(const Position& position, const Observation& seen) {
-  if (!on_terminal_) put(stream_, fmt::format("{}\n", describe(position, seen)), Worth::passing);
+  if (!on_terminal_) put(stream_, fmt::format("{}\n", words_(position, seen)), Worth::passing);
 }
 
 void PrintedProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }

@@ -47,10 +47,18 @@ class Progress {
   virtual void say(const std::string&) {}
 };
 
+/// "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale values are shown as
+/// '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s".
+[[nodiscard]] std::string describe(const Position& position, const Observation& seen);
+/// " 6001 of  6000 RPM  thrust  0.612 N  torque   -8.9 mN m   48 W  shakes 0.05 N  blades 0.021 N at 300 Hz".
+[[nodiscard]] std::string describe_by_hand(const Position& position, const Observation& seen);
+
 /// On a terminal one line rewritten in place, at most ten times a second; elsewhere one line per step.
 class PrintedProgress final : public Progress {
  public:
-  PrintedProgress(std::FILE* stream, bool on_terminal) : stream_(stream), on_terminal_(on_terminal) {}
+  using Describe = std::string(const Position& position, const Observation& seen);
+  PrintedProgress(std::FILE* stream, bool on_terminal, Describe* words = &describe)
+      : stream_(stream), on_terminal_(on_terminal), words_(words) {}
   ~PrintedProgress() override;
   void tick(const Position& position, const Observation& seen) override;
   void step_done(const Position& position, const Observation& seen) override;
@@ -61,12 +69,9 @@ class PrintedProgress final : public Progress {
   [[nodiscard]] std::string clearing() { return std::exchange(drawn_, false) ? "\r\x1b[K" : ""; }
   std::FILE* stream_;
   const bool on_terminal_;
+  Describe* const words_;
   bool drawn_ = false;
   std::chrono::steady_clock::time_point next_{};
 };
-
-/// "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale values are shown as
-/// '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s".
-[[nodiscard]] std::string describe(const Position& position, const Observation& seen);
 
 }  // namespace kphi::daq

@@ -22,7 +22,7 @@ namespace {
 constexpr int kReadings = 2;  // attempts at the end; a page may be lost
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
-  const auto& [campaign, config, mounted, planned, remaining, file] = order;
+  const auto& [campaign, config, mounted, planned, remaining, file, steering] = order;
   results::RunHeader header;
   header.started_utc = utc_text(bench.clock(), bench.clock().now());
   // A name-based UUID: unique by campaign, config in it and time, and reproducible on the deterministic bench.
@@ -187,7 +187,7 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   const DeviceLimits devices = device_limits(bench);
   const std::vector<GuardLimit> limits = combine_limits(order.campaign, order.config, &devices);
   progress.guarded(limits);
-  Guard guard(bench, order.config, scale, limits);
+  Guard guard(bench, order.config, scale, limits, order.campaign.propeller.blades);
   Recorder recorder(bench, guard, writer);
   Sequence sequence(bench, recorder, guard, order, progress, stop_asked);
   Ended ended = carry_out(sequence, bench, guard, recorder);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "daq/run/steering.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
@@ -28,6 +29,7 @@ struct RunOrder {
   profiles::PlannedRun planned;  ///< may have fewer steps than in the plan
   double remaining_bench_s = 0;  ///< of the campaign, this run included
   std::filesystem::path file;    ///< final path
+  Steering* steering = nullptr;  ///< sets the speeds instead of the planned steps
 };
 
 }  // namespace kphi::daq

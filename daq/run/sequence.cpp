@@ -18,6 +18,7 @@ namespace {
 using results::Phase;
 
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
+constexpr double kHandSlew = 200;  // rad/s², where the campaign sets none
 constexpr double kEndRamp = 1000;  // rad/s², on a supply that sinks what it feeds back
 constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // samples in transit still carry the old zero
 constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
@@ -51,7 +52,7 @@ void Sequence::run() {
   hold_zero(Phase::zero_before);
   require_rest();
   guard_.take_zero(recorder_.measured().mean);
-  spin_through_the_steps();
+  spin();
   wait_for_standstill();
   hold_zero(Phase::zero_after);
   mark(Phase::end);
@@ -169,14 +170,49 @@ void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
   }
 }
 
-void Sequence::spin_through_the_steps() {
-  MotorEnable spin(bench_.motor(), order_.config.iq.spin, guard_);
-  has_spun_ = true;
+void Sequence::go_through_the_steps(MotorEnable& spin) {
   for (const profiles::PlannedStep& step : order_.planned.steps) {
     if (out_of_reach_ && step.speed >= *out_of_reach_) continue;
     hold_step(step, spin);
     learn_from(step);
   }
+}
+
+void Sequence::follow(Steering& steering, MotorEnable& spin) {
+  const double slew = order_.campaign.profile.slew_rad_s2.value_or(kHandSlew);
+  const Duration tick = bench_.clock().stretched(kTickWall);
+  std::optional<RadPerSec> target;
+  bool holds = false;
+  Instant last = bench_.clock().now();
+  const auto leave = [&] {
+    if (std::exchange(holds, false)) progress_.step_done(position_, seen_);
+  };
+  while (const auto wanted = steering.wanted(bench_.clock().now(), position_.commanded)) {
+    const Instant now = bench_.clock().now();
+    const double most = slew * to_seconds(std::min(now - std::exchange(last, now), 2 * tick));
+    if (position_.commanded != *wanted) {
+      leave();
+      if (std::exchange(target, *wanted) != wanted) mark(Phase::ramp, -1, *wanted);
+      const double left = (*wanted - position_.commanded).value();
+      position_.commanded =
+          std::abs(left) <= most ? *wanted : position_.commanded + RadPerSec(std::clamp(left, -most, most));
+      change_speed();
+      spin.at(position_.commanded);
+    } else if (!std::exchange(holds, true)) {
+      target.reset();
+      position_.steps = ++position_.step + 1;
+      mark(Phase::step, position_.step, position_.commanded);
+    }
+    hold(tick, &spin);
+  }
+  leave();
+  progress_.say("stopping: " + steering.why());
+}
+
+void Sequence::spin() {
+  MotorEnable spin(bench_.motor(), order_.config.iq.spin, guard_);
+  has_spun_ = true;
+  order_.steering != nullptr ? follow(*order_.steering, spin) : go_through_the_steps(spin);
   position_.step = -1;
   position_.commanded = RadPerSec(0);
   mark(Phase::spin_down);

@@ -58,7 +58,10 @@ class Sequence {
   void watch_the_coast(StopWords& words);
   void take_box_bias();
   void set_box_bias();
-  void spin_through_the_steps();
+  void spin();
+  void go_through_the_steps(MotorEnable& spin);
+  /// As the steering wants, no faster than the campaign's slew.
+  void follow(Steering& steering, MotorEnable& spin);
   void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
   /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
   void learn_from(const profiles::PlannedStep& step);

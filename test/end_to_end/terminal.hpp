@@ -25,8 +25,8 @@ class Terminal {
   Terminal& operator=(const Terminal&) = delete;
 
   /// Enter included.
-  void type(const std::string& line) const {
-    const std::string keys = line + "\n";
+  void type(const std::string& line) const { press(line + "\n"); }
+  void press(const std::string& keys) const {
     if (::write(typist_, keys.data(), keys.size()) < 0) throw std::runtime_error("cannot type");
   }
   /// To be the program's standard input.

@@ -63,6 +63,7 @@ inline const std::vector<Room>& rooms() {
       {"daq/virtual", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/run", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/campaign", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/spin", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/live", {"base", "compensation/units.hpp", "profiles", "results", "daq"}},
       {"daq", {"base", "profiles", "daq"}},
 

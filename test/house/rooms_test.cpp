@@ -183,5 +183,31 @@ TEST(Violations, KeepTheFlyingLibraryToTheStandardLibraryAndEigen) {
   EXPECT_EQ(system("daq/run/run.cpp", "fmt/format.h"), 0u);
 }
 
+/// Each row of the table names the tests that break it on purpose: all words of a link stand in its file, and that file
+/// is built.
+TEST(Hazards, HaveATestEach) {
+  const std::filesystem::path root = kphi::test::source_dir();
+  const std::string page = read(root / "daq/README.md");
+  EXPECT_THAT(page, testing::HasSubstr("A program is no emergency stop"));
+  static const std::regex kRow(R"(\|[^|\n]+\|[^|\n]+\|[^|\n]+\|([^|\n]*\.\./test/[^|\n]*)\|)"),
+      kLink(R"(\[([^\]]+)\]\(\.\./([^)]+)\))");
+  int rows = 0;
+  for (std::sregex_iterator row(page.begin(), page.end(), kRow), end; row != end; ++row, ++rows) {
+    const std::string tests = (*row)[1];
+    for (std::sregex_iterator link(tests.begin(), tests.end(), kLink); link != end; ++link) {
+      const std::filesystem::path file = root / (*link)[2].str();
+      ASSERT_TRUE(std::filesystem::exists(file)) << file;
+      const std::string source = read(file);
+      std::istringstream words((*link)[1]);
+      for (std::string word; words >> word;) EXPECT_THAT(source, testing::HasSubstr(word)) << file;
+      std::string lists;
+      for (auto folder = file.parent_path(); folder != root; folder = folder.parent_path())
+        if (std::filesystem::exists(folder / "CMakeLists.txt")) lists += read(folder / "CMakeLists.txt");
+      EXPECT_THAT(lists, testing::HasSubstr(file.filename())) << "nobody builds it";
+    }
+  }
+  EXPECT_GE(rows, 25);
+}
+
 }  // namespace rooms_test
 }  // namespace kphi::house

@@ -142,6 +142,9 @@ function showReadings(tick) {
   text('drive', tick.fault_bits !== 0 ? `fault 0x${tick.fault_bits.toString(16)}`
     : tick.derate === null ? '?' : faulty ? `derates to ${fixed(100 * tick.derate, 0)} %` : 'no fault');
   at('drive').classList.toggle('bad', faulty);
+  const rms = Math.hypot(...(tick.vibration || [null]).slice(0, 3).map(each => each ?? NaN));
+  text('vibration', Number.isNaN(rms) ? '–' : `${fixed(rms, 2)} N` + (tick.blade_pass_n === null ? ''
+    : ` · ${fixed(tick.blade_pass_n, 2)} N at ${fixed(tick.blade_pass_hz, 0)} Hz`));
   text('received', thousands(tick.received));
   text('lost', `${thousands(tick.lost_network)}, ${thousands(tick.lost_host)}`);
   at('lost').classList.toggle('bad', tick.lost_network + tick.lost_host > 0);
@@ -214,7 +217,16 @@ function stop() {
   banner('', 'STOP sent.', 'Waiting for kphi to confirm.');
 }
 
+const steers = () => state.hello && state.hello.by_hand && !state.ended && link && link.readyState === WebSocket.OPEN;
+const kSteering = { ArrowUp: 'up', ArrowDown: 'down', Enter: 'hold' };
+for (const word of Object.values(kSteering)) at(word).addEventListener('click', () => { if (steers()) link.send(word); });
+
 addEventListener('keydown', event => {
+  if (steers() && kSteering[event.key]) {
+    event.preventDefault();
+    link.send(kSteering[event.key]);
+    return;
+  }
   if (event.key !== ' ' && event.key !== 'Escape') return;
   event.preventDefault();
   if (!event.repeat) stop();
@@ -230,6 +242,8 @@ const take = {
     text('name', message.name);
     text('what', message.propeller + (message.replay ? ' · replay of a recorded run' : ''));
     at('lines').replaceChildren();
+    at('hand').hidden = !message.by_hand;
+    document.body.classList.toggle('hand', message.by_hand);
     makeLimits(message.limits);
     makeCharts();
     banner('', '', '');

@@ -281,6 +281,26 @@ TEST_F(LiveServer, StopsNothingThatIsOnlyReplayed) {
   EXPECT_FALSE(feed_.stop_asked());
 }
 
+TEST_F(LiveServer, TakesKeysOnlyWhereTheMotorIsTurnedByHand) {
+  start([](Server::Settings& settings) { settings.can_steer = true; });
+  const auto page = caught_up();
+  for (const char* word : {"up", "hold", "down"}) page->say(word);
+  page->say("stop");
+  EXPECT_EQ(page->hear()["type"], "stop") << "after them";
+  EXPECT_EQ(feed_.take_key(), Key::up);
+  EXPECT_EQ(feed_.take_key(), Key::hold);
+  EXPECT_EQ(feed_.take_key(), Key::down);
+  EXPECT_EQ(feed_.take_key(), std::nullopt);
+}
+
+TEST_F(LiveServer, DropsWhoSteersARun) {
+  start();
+  const auto page = caught_up();
+  page->say("up");
+  EXPECT_TRUE(page->hear().is_discarded());
+  EXPECT_EQ(feed_.take_key(), std::nullopt);
+}
+
 TEST_F(LiveServer, DropsWhoSaysAnythingElse) {
   start();
   for (const std::string& word : {std::string("Stop"), std::string("stop "), std::string(), std::string("{}"),

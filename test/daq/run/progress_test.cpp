@@ -1,6 +1,6 @@
 #include "daq/run/progress.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "test/daq/bench_fixture.hpp"
 
@@ -47,6 +47,22 @@ TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
   observation.motor_age = std::chrono::seconds(2);
   EXPECT_EQ(describe(in_a_step(), observation),
             begin + "   ? of  7895 RPM  thrust      ? N  left 06:12  no speed for 2.0 s  no thrust for 0.8 s");
+}
+
+TEST(ProgressByHand, ShowsWhatOneLooksAtWhileTurningAKnob) {
+  Observation observation = seen();
+  observation.torque_nm = -0.0148;
+  observation.judged[Watched::supply_voltage_low] = 12;
+  observation.judged[Watched::supply_current] = 2.5;
+  observation.vibration.rms = {0.03, 0, 0.04, 0, 0, 0};
+  EXPECT_EQ(describe_by_hand(in_a_step(), observation),
+            " 7894 of  7895 RPM  thrust  1.162 N  torque  -14.8 mN m    30 W  shakes 0.05 N rms");
+  observation.vibration.blade_pass_hz = 394.7;
+  observation.vibration.blade_pass_n = 0.0212;
+  EXPECT_THAT(describe_by_hand(in_a_step(), observation), testing::EndsWith("rms  blades 0.021 N at 395 Hz"));
+  observation.load_cell_age = std::chrono::milliseconds(840);
+  EXPECT_THAT(describe_by_hand(in_a_step(), observation),
+              testing::AllOf(testing::HasSubstr("thrust      ? N"), testing::EndsWith("no thrust for 0.8 s")));
 }
 
 TEST(ProgressElsewhere, IsOneLinePerStepWithoutControlCharacters) {

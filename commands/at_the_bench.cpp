@@ -1,0 +1,33 @@
+#include "commands/at_the_bench.hpp"
+
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "daq/guard/interlock.hpp"
+#include "daq/guard/run_stopped.hpp"
+
+namespace kphi::commands {
+
+bool has_terminal() {
+  const char* term = std::getenv("TERM");
+  return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
+}
+
+std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,
+                                          const std::function<bool()>& stop_asked) {
+  const SteadyClock wall;
+  std::unique_ptr<daq::Bench> bench;
+  try {
+    bench = daq::connect(config, stop_asked);
+  } catch (const daq::Interrupted&) {
+    throw;
+  } catch (const std::exception&) {
+    daq::require_awake(wall);
+    throw;
+  }
+  daq::require_awake(wall);
+  return bench;
+}
+
+}  // namespace kphi::commands

@@ -1,0 +1,18 @@
+// What verbs that turn the motor have in common.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "daq/bench/bench.hpp"
+
+namespace kphi::commands {
+
+/// A live line can be rewritten on stderr.
+[[nodiscard]] bool has_terminal();
+
+/// Refuses a computer that slept while it connected: the answers of the devices are outdated. Throws as connect.
+[[nodiscard]] std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,
+                                                        const std::function<bool()>& stop_asked);
+
+}  // namespace kphi::commands

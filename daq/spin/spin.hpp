@@ -1,0 +1,47 @@
+// The motor turned by hand, before anybody trusts a campaign to it: the same guard, limits and record as a run.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daq/bench/bench.hpp"
+#include "daq/campaign/operator.hpp"
+#include "daq/run/progress.hpp"
+#include "daq/run/run.hpp"
+#include "daq/spin/hand_control.hpp"
+#include "profiles/bench_config.hpp"
+#include "profiles/campaign.hpp"
+#include "results/step_mean.hpp"
+
+namespace kphi::daq {
+
+struct Spin {
+  Bench& bench;
+  const profiles::Campaign& campaign;  ///< propeller, limits, slew; its steps do not count
+  const profiles::BenchConfig& config;
+  Operator& person;
+  Progress& progress;
+  const std::function<bool()>& stop_asked;
+  HandControl::Settings speeds;
+  std::function<std::optional<Key>()> next_key;
+  std::filesystem::path file;
+};
+
+struct SpinResult {
+  RunResult run;
+  std::vector<results::StepMean> held;  ///< one for each speed that was held for longer than is discarded
+};
+
+/// Asks whether the stand is clear, then turns the motor until the time is over, a key or nobody at the keys says stop.
+/// Throws as record_run.
+[[nodiscard]] SpinResult spin_by_hand(const Spin& spin);
+
+/// What thrust and torque of a turning propeller say against the bench file: a mirrored axis, a propeller that pushes,
+/// a rotor that turns the other way. Thrust N along the thrust axis, torque N m about it, `spin` +1 counter-clockwise
+/// from above. The cell feels the reaction: it opposes the turning.
+[[nodiscard]] std::optional<std::string> doubt_about_signs(double thrust_n, double torque_nm, int spin);
+
+}  // namespace kphi::daq
