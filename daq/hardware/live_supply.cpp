@@ -12,10 +12,14 @@
 namespace kphi::daq {
 namespace {
 
-constexpr double kReadingsPerSecond = 8;      // the motor must coast 0.2 s after a trip; stock Riden allow up to 10
+constexpr double kLooksOfAnInstrument = 8;    // per second; SCPI instruments bear that
 constexpr std::chrono::seconds kRise{3};      // wall time until the voltage must be there
-constexpr std::chrono::seconds kConfirm{3};   // wall time for the order to switch off
+constexpr std::chrono::seconds kConfirm{5};   // wall time for the order to switch off
 constexpr std::chrono::milliseconds kAsk{2};  // between two checks of the newest reading
+
+double looks_per_second(const profiles::SupplyConfig& config) {
+  return scpi::is_scpi(config.uri) ? kLooksOfAnInstrument : supply::parse_address(config.uri).looks;
+}
 
 }  // namespace
 
@@ -34,7 +38,7 @@ std::string summary(const supply::Identity& identity) {
 }
 
 LiveSupply::LiveSupply(const profiles::SupplyConfig& config, const Clock& clock)
-    : config_(config), worker_(open_supply(config, clock), clock, kReadingsPerSecond) {}
+    : config_(config), worker_(open_supply(config, clock), clock, looks_per_second(config)) {}
 
 std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 

@@ -11,6 +11,7 @@
 #include "daq/guard/rest_guard.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/speed_cap.hpp"
+#include "results/reduction/quality_flags.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -237,6 +238,12 @@ void Sequence::hold_step(const profiles::PlannedStep& step, MotorEnable& spin) {
 
 void Sequence::learn_from(const profiles::PlannedStep& step) {
   if (!seen_.motor_is_fresh() || !is_out_of_drive(step.speed, seen_.speed(), seen_.drive_pwm)) return;
+  const double volts = seen_.judged[Watched::supply_voltage_low], wanted = order_.campaign.supply.value();
+  if (volts < (1 - results::kSupplyBand) * wanted)
+    return progress_.say(
+        fmt::format("supply: {:.3g} V at the motor instead of {:g} V, so full drive gives {:.0f} of {:.0f} "
+                    "RPM; check its leads and its current limit",
+                    volts, wanted, to_rpm(seen_.speed()), to_rpm(step.speed)));
   out_of_reach_ = step.speed;
   const auto& steps = order_.planned.steps;
   const auto left_out = std::count_if(steps.begin() + position_.step + 1, steps.end(),

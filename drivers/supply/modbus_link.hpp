@@ -18,7 +18,7 @@ namespace kphi::supply {
 
 /// Deadlines, wall time.
 struct Timing {
-  std::chrono::milliseconds answer{500};  ///< stock Riden firmware answers fewer than 10 requests per second
+  std::chrono::milliseconds answer{700};  ///< stock Riden firmware takes 50 to 500 ms
   std::chrono::milliseconds byte{100};    ///< within an answer
   std::chrono::milliseconds quiet{150};   ///< silence after which a late answer is no longer expected
 };

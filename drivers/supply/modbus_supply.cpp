@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <stdexcept>
+#include <utility>
 
 #include "base/error.hpp"
 #include "drivers/serial/port.hpp"
@@ -51,10 +52,10 @@ void ModbusSupply::identify() {
 /// nullptr: not of this family. Appends its answer to `answers`.
 const Model* ModbusSupply::ask_model(const RegisterMap& map, std::string& answers) {
   const char* const join = answers.empty() ? "" : ", ";
-  bool refused = false;
+  bool refused = false, refused_once = false;
   persist("identify", [&] {
     Outcome outcome = link_.read(map.identity, registers_);
-    refused = outcome.failure == Failure::refused;
+    refused = outcome.failure == Failure::refused && std::exchange(refused_once, true);
     return refused ? Outcome{} : outcome;
   });
   if (refused) {
@@ -215,10 +216,12 @@ void ModbusSupply::switch_off() {
 /// The advice fits the first failure: over TCP a late answer to the first request makes the next one look damaged.
 void ModbusSupply::persist(const std::string& operation, const std::function<Outcome()>& attempt) {
   Outcome first, newest;
-  for (int i = 0; i < kAttempts && newest.failure != Failure::refused; ++i) {
+  int refusals = 0;  // stock firmware refuses a request now and then
+  for (int i = 0; i < kAttempts && refusals < 2; ++i) {
     newest = unsettled_ ? settle() : Outcome{};
     if (newest.ok()) newest = attempt();
     if (newest.ok()) return;
+    refusals += newest.failure == Failure::refused;
     if (!unsettled_) unsettled_ = newest.failure != Failure::busy && newest.failure != Failure::refused;
     if (first.ok()) first = newest;
   }

@@ -14,6 +14,7 @@ namespace kphi::supply {
 namespace {
 
 constexpr unsigned kBauds[] = {1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600};
+constexpr unsigned kMostLooks = 20;
 constexpr const char* kForms =
     "write modbus-rtu:/dev/ttyUSB0?baud=115200&slave=1 or modbus-tcp:192.168.1.20:502?slave=1";
 
@@ -35,8 +36,14 @@ void set_option(Address& address, const Uri& uri, const std::string& key, const 
       uri.refuse(fmt::format("unknown model \"{}\"", value),
                  fmt::format("use one of {}", fmt::join(model_names(), ", ")));
     address.model = value;
+  } else if (key == "looks") {
+    if (!number || *number < 1 || *number > kMostLooks)
+      uri.refuse(fmt::format("\"{}\" is no number of readings per second", value),
+                 fmt::format("use 1 to {}; the default is {}", kMostLooks, Address{}.looks));
+    address.looks = *number;
   } else {
-    uri.refuse(fmt::format("unknown option \"{}\"", key), rtu ? "use baud, slave or model" : "use slave or model");
+    uri.refuse(fmt::format("unknown option \"{}\"", key),
+               rtu ? "use baud, slave, model or looks" : "use slave, model or looks");
   }
 }
 

@@ -30,8 +30,9 @@ struct Address {
   std::string device;  ///< rtu: absolute path
   unsigned baud = 0;   ///< rtu: one that known_baud() knows
   HostPort tcp;
-  int slave = 1;      ///< 1 to 247; tcp also 255
-  std::string model;  ///< of the table of models; empty: any of them
+  int slave = 1;       ///< 1 to 247; tcp also 255
+  std::string model;   ///< of the table of models; empty: any of them
+  unsigned looks = 4;  ///< readings per second; more only where a module is known to bear them
 
   /// "/dev/ttyUSB1" or "192.168.1.20:502".
   [[nodiscard]] std::string where() const;

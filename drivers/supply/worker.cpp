@@ -73,9 +73,12 @@ void Worker::run() noexcept {
   finish(why_failed([this] {
     next_look_ = clock_.now();
     while (serve()) {
-      if (clock_.now() < next_look_) continue;
+      const Instant begun = clock_.now();
+      if (begun < next_look_) continue;
       look();
-      next_look_ = std::max(next_look_ + period_, clock_.now());
+      // A slow supply is left alone for as long as it took.
+      const Instant done = clock_.now();
+      next_look_ = std::max(next_look_ + period_, done + std::min(done - begun, period_));
     }
   }));
 }

@@ -26,7 +26,7 @@ namespace kphi::supply {
 
 class Worker {
  public:
-  /// Readings per second of bench time; real supplies tolerate 2 to 5.
+  /// Readings per second of bench time, fewer where the supply answers slowly; real supplies tolerate 2 to 5.
   static constexpr double kUsualRate = 4;
 
   /// `clock` outlives the worker.

@@ -29,7 +29,8 @@ inline std::string bench_text(const std::filesystem::path& folder, int rdt_port,
 /// A supply on a pseudo-terminal that gives what the simulated motor takes at 19,100 RPM.
 inline std::string supply_text(const std::filesystem::path& folder) {
   return fmt::format(
-      "supply: {{uri: \"modbus-rtu:{}/supply?model=RD6024\", voltage_v: 12, current_limit_a: 24, over_voltage_v: 14, "
+      "supply: {{uri: \"modbus-rtu:{}/supply?model=RD6024&looks=8\", voltage_v: 12, current_limit_a: 24, "
+      "over_voltage_v: 14, "
       "over_current_a: 24}}\n",
       folder.string());
 }

@@ -1,6 +1,7 @@
 // A supply as slow as stock firmware, 10 answers a second over a true pseudo-terminal, some of them so late that nobody
 // waits for them any more, beside 7000 load-cell samples a second over true UDP.
 #include <gmock/gmock.h>
+#include <signal.h>
 
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
@@ -9,7 +10,7 @@
 namespace kphi::test::slow_supply_test {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr double kTimeout = 0.5;  // s: what the driver waits for an answer
+constexpr double kTimeout = 0.7;  // s: what the driver waits for an answer
 
 /// An answer that leaves 50 ms after the driver has given up, with 11 V in it, which no other answer has.
 std::string late_answer(double at_s) {
@@ -50,6 +51,28 @@ TEST(SlowSupply, DisturbsNothingAndNoneOfItsLateAnswersBecomesAValue) {
     if (i > 0) longest = std::max(longest, kept.supply[i].time_ns - kept.supply[i - 1].time_ns);
   }
   EXPECT_GT(longest, static_cast<std::int64_t>(kTimeout * kSecond)) << "no answer was late: this test showed nothing";
+}
+
+/// Every answer takes 0.45 s, as of stock firmware 1.40.
+TEST(SlowSupply, ThatTakesHalfASecondForEveryAnswerIsAskedLessOftenAndCarriesARun) {
+  RunningBench bench({1, 7000, "  - {at_s: 0, for_s: 1000, kind: supply_late, delay_s: 0.45}\n", true});
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
+  Process run(bench.run_command());
+  ASSERT_EQ(run.wait(), 0) << run.err();
+  const results::RunRecording kept = results::read_run(the_run_in(bench.path("results")));
+  ASSERT_GT(kept.supply.size(), 3u);
+  for (std::size_t i = 1; i < kept.supply.size(); ++i)
+    EXPECT_GT(kept.supply[i].time_ns - kept.supply[i - 1].time_ns, kSecond / 2) << "its line is left alone meanwhile";
+  EXPECT_TRUE(bench.account().ends_without_power());
+}
+
+TEST(SlowSupply, OfAKilledProgramIsSwitchedOffAllTheSame) {
+  RunningBench bench({1, 7000, "  - {at_s: 0, for_s: 1000, kind: supply_late, delay_s: 0.45}\n", true});
+  Process run(bench.run_command());
+  ASSERT_TRUE(bench.await_speed(500)) << run.err();
+  run.signal(SIGKILL);
+  EXPECT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == false; }, std::chrono::seconds(5)));
+  EXPECT_EQ(run.wait(), 128 + SIGKILL);
 }
 
 }  // namespace kphi::test::slow_supply_test

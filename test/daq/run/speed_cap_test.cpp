@@ -45,6 +45,14 @@ TEST(SpeedCap, IsNotLearnedFromASpeedThatWasMissedForAnotherReason) {
   EXPECT_FALSE(cap.speed());
 }
 
+TEST(SpeedCap, IsNotLearnedFromASupplyThatSags) {
+  for (const QualityFlag flag : {QualityFlag::supply_sag, QualityFlag::supply_out_of_band}) {
+    SpeedCap cap;
+    EXPECT_FALSE(cap.learn(
+        std::vector{kHeld, step(1900, 1820, {flag, QualityFlag::drive_saturated, QualityFlag::speed_not_reached})}));
+  }
+}
+
 TEST(SpeedCap, IsLearnedFromADeratedMotorAndALimitedSupply) {
   for (const QualityFlag flag : {QualityFlag::derated, QualityFlag::supply_limited}) {
     SpeedCap cap;

@@ -92,11 +92,16 @@ class OneSupply : public testing::Test {
   ModbusSupply supply{simulated.address(), clock, kShort};
 };
 
-TEST_F(OneSupply, MeetsAnExceptionAndDoesNotAskAgain) {
+TEST_F(OneSupply, MeetsOneExceptionAndAsksAgain) {
+  simulated.spoil({.kind = FaultKind::supply_exception, .count = 1, .code = 2});
+  EXPECT_FALSE(supply.read().output);
+}
+
+TEST_F(OneSupply, MeetsTwoExceptionsAndAsksNoMore) {
   simulated.spoil(lasting(FaultKind::supply_exception));
   const std::uint64_t before = simulated.truth().requests;
   EXPECT_THROW((void)supply.read(), DeviceError);
-  EXPECT_EQ(simulated.truth().requests - before, 1u);
+  EXPECT_EQ(simulated.truth().requests - before, 2u);
 }
 
 TEST_F(OneSupply, MeetsABusyDeviceAndAsksAgain) {
