@@ -29,6 +29,13 @@ class DelayHistogram {
     }
     return Duration{0};
   }
+  /// Those that came after `earlier`, a copy of this one.
+  [[nodiscard]] DelayHistogram since(const DelayHistogram& earlier) const noexcept {
+    DelayHistogram later = *this;
+    for (std::size_t i = 0; i < counts_.size(); ++i) later.counts_[i] -= earlier.counts_[i];
+    later.total_ -= earlier.total_;
+    return later;
+  }
 
  private:
   // Eight classes for each power of two.

@@ -14,6 +14,7 @@ constexpr double kRelayed = 10;  // s that the recorder may be behind
 constexpr std::size_t kReadingsRelayed = 16384;
 constexpr std::size_t kSupplyReadingsRelayed = 256;
 constexpr std::size_t kAtOnce = 1024;
+constexpr const char* kDidNotRun = "this computer did not run kphi";
 constexpr double kAbsence = 0.05;     // s not run by this computer: long enough to be why a device seems late
 constexpr double kAbsenceCounts = 1;  // s after it
 constexpr Duration kSecondCheckWall = std::chrono::milliseconds(20);
@@ -212,7 +213,7 @@ void Guard::judge_pause(Instant now) {
   const double unwatched = wall_seconds_since(polled_ns_, now);
   if (unwatched > limit->value) {
     found.source = Source::computer;
-    found.reason = fmt::format("this computer did not run kphi for {:.2g} s", unwatched);
+    found.reason = fmt::format("{} for {:.2g} s", kDidNotRun, unwatched);
   }
   trip(std::move(found));
 }
@@ -242,11 +243,11 @@ void Guard::name_absence(Trip& trip) const {
                           trip.watched == Watched::supply_age || trip.watched == Watched::speed_error ||
                           trip.watched == Watched::samples_missing ||
                           (trip.link_failed && trip.source == Source::motor);
-  if (!can_be_why) return;
+  if (!can_be_why || trip.reason.find(kDidNotRun) != std::string::npos) return;  // or its link has said so
   const Absence absence = absence_.read();
   if (absence.lasted_s < kAbsence) return;
   if (wall_seconds_since(absence.ended.count(), trip.noticed) > kAbsenceCounts) return;
-  trip.reason = fmt::format("this computer did not run kphi for {:.2g} s; then: {}", absence.lasted_s, trip.reason);
+  trip.reason = fmt::format("{} for {:.2g} s; then: {}", kDidNotRun, absence.lasted_s, trip.reason);
   trip.source = Source::computer;
 }
 

@@ -96,7 +96,7 @@ const Case kCases[] = {
     {"Guard", {"guard"}, 400, "the guard was blocked for"},
     {"RunnerAndGuard", {"kphi", "guard"}, 500, "did not renew its command in time|did not run kphi for|blocked for"},
     {"LoadCell", {"load cell"}, 145 + 30, "age of the newest load-cell sample"},
-    {"Motor", {"motor"}, 145 + 30, "age of the newest motor reading"},
+    {"Motor", {"motor"}, 145 + 30, "age of the newest motor reading|did not run kphi"},
     {"MotorAndSupply", {"motor", "supply"}, 500, "motor"},
     {"Supply", {"supply"}, 2000, "age of the newest supply reading"},
     {"Recorder", {"recorder"}, 5000, "kphi could not write to the run file"},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace kphi::iq {
 namespace {
@@ -77,7 +78,10 @@ void Session::spin_at(RadPerSec signed_speed, Instant now) {
   stopping_.end(StopReport::Outcome::overruled);
   check_drive(now);
   if (!armed()) return;
-  spinning_ = true;
+  if (!std::exchange(spinning_, true)) {  // each spin is judged by its own round trips
+    judged_until_ = exchange_.round_trips();
+    round_trip_judged_ = false;
+  }
   commanded_speed_ = speed;
   drive_.begin(now);
   coasting_.end();
@@ -258,9 +262,9 @@ void Session::conclude_let_go(Instant now) {
 }
 
 void Session::judge_round_trip(Instant now) {
-  if (round_trip_judged_ || exchange_.round_trips().total() < kRoundTrips) return;
+  if (round_trip_judged_ || exchange_.round_trips().total() < judged_until_.total() + kRoundTrips) return;
   round_trip_judged_ = true;
-  const Duration median = exchange_.round_trips().quantile(0.5);
+  const Duration median = exchange_.round_trips().since(judged_until_).quantile(0.5);
   if (median <= settings_.reply_timeout / kSlowShare) return;
   note(
       EventKind::motor_slow_round_trip,

@@ -139,6 +139,7 @@ class Session {
   double commanded_speed_ = 0;         ///< rad/s, the last one
   std::optional<float> wanted_speed_;  ///< waits for credit
   bool round_trip_judged_ = false;
+  DelayHistogram judged_until_;  ///< when this spin began
 };
 
 }  // namespace kphi::iq

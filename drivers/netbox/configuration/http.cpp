@@ -10,6 +10,7 @@
 
 #include "base/error.hpp"
 #include "base/tcp.hpp"
+#include "drivers/netbox/configuration/interfaces.hpp"
 
 namespace kphi::netbox {
 namespace {
@@ -102,10 +103,11 @@ http::response<http::string_body> read_response(TcpClient& box) {
   return parser.release();
 }
 
-std::string advice(const TcpError& error, std::uint16_t port) {
+std::string advice(const TcpError& error, const std::string& host, std::uint16_t port) {
   if (error.cause == TcpError::Cause::refused)
     return fmt::format("a device is at this address, but no web server on port {}: check the address and http_port",
                        port);
+  if (const std::string other = advice_to_reach(host, interfaces()); !other.empty()) return other;
   const std::string all = "check the address, the cable and the box's power";
   if (error.cause != TcpError::Cause::timeout) return all;
   return all + "; the box serves one connection at a time: close its web pages";
@@ -133,7 +135,7 @@ std::string http_get(const std::string& host, std::uint16_t port, const std::str
                       error.cause == TcpError::Cause::timeout
                           ? fmt::format("no answer within {:.1f} s (could not {})", seconds, box.step())
                           : fmt::format("could not {}: {}", box.step(), error.what()),
-                      advice(error, port));
+                      advice(error, host, port));
   }
 }
 

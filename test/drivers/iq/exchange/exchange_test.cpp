@@ -229,6 +229,25 @@ TEST(RoundTrips, AreToldWhenTheyBlurReadingsInTime) {
   }
 }
 
+TEST(RoundTrips, AreJudgedAnewForEachSpin) {
+  for (const Duration latency : {2ms, 16ms}) {
+    Wire wire;
+    wire.latency = latency;
+    wire.connect();
+    wire.run_for(5s);
+    for (int spin = 0; spin < 3; ++spin) {
+      (void)wire.session.take_events();
+      wire.session.spin_at(RadPerSec(500), wire.now);
+      wire.run_for(5s);
+      wire.session.emergency_stop(wire.now);
+      wire.run_for(1s);
+      const auto events = wire.session.take_events();
+      EXPECT_EQ(std::ranges::count(events, EventKind::motor_slow_round_trip, &StreamEvent::kind), latency > 4ms ? 1 : 0)
+          << "spin " << spin;
+    }
+  }
+}
+
 TEST(AdaptiveTimeout, BeginsAtTheLongestAndFollowsRfc6298) {
   AdaptiveTimeout timeout(1ms, 1s);
   EXPECT_EQ(timeout.timeout(), 1s);
