@@ -190,7 +190,8 @@ class CampaignRun {
         progress_.say("air: no current reading; air density of this run unknown");
       const auto awake = keep(&Bench::keep_awake, "may_sleep");
       const RunOrder order{campaign_, config_, *mounted_, capped, remaining_s, file};
-      accept(record(order), planned);
+      (void)keep(&Bench::keep_prompt, "may_be_late");  // asked for again by the run itself: only to tell a refusal
+      accept(record_run(bench_, order, progress_, stop_asked_), planned);
     } catch (...) {
       const auto cause = std::current_exception();
       note_the_end(results::kRunAborted, {{"run", file.filename().string()},
@@ -229,11 +230,6 @@ class CampaignRun {
       note(found.device == Source::motor ? "motor_finding" : "load_cell_finding", found.finding);
     }
     if (!config_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
-  }
-
-  [[nodiscard]] RunResult record(const RunOrder& order) {
-    const auto prompt = keep(&Bench::keep_prompt, "may_be_late");
-    return record_run(bench_, order, progress_, stop_asked_);
   }
 
   /// For as long as the handle lives; a refusal is reported once.

@@ -128,6 +128,9 @@ Ended carry_out(Sequence& sequence, Bench& bench, Guard& guard, Recorder& record
   const auto guarding = bench.run_periodically({"guard", true}, [&] { guard.poll(); });
   const auto draining = bench.run_periodically({"recorder"}, [&] { recorder.drain(); });
   try {
+    // No longer than that: what computes for long, as finishing a file does, must not have it.
+    std::string told_before;
+    const auto prompt = bench.keep_prompt(told_before);
     sequence.run();
   } catch (...) {
     ended.cause = std::current_exception();  // the motor coasts since the MotorEnable has gone

@@ -66,6 +66,7 @@ SpinResult spin_by_hand(const Spin& spin) {
       [&](const std::string& condition) { return spin.person.confirm_clear(to_rpm(spin.speeds.start), condition); });
   spin.bench.restore_power();
   HandControl steering(spin.speeds, spin.next_key);
+  steering.forget_keys();
   profiles::PlannedRun planned;
   planned.mount = false;
   const double lasts_s = spin.speeds.lasts ? to_seconds(*spin.speeds.lasts) : 0;
@@ -73,10 +74,8 @@ SpinResult spin_by_hand(const Spin& spin) {
   SignWatch watched(spin.progress, spin.config.iq.spin);
   std::string awake_not, prompt_not;
   const auto awake = kept(spin.bench.keep_awake(awake_not), awake_not, watched);
-  RunResult run = [&] {
-    const auto prompt = kept(spin.bench.keep_prompt(prompt_not), prompt_not, watched);
-    return record_run(spin.bench, order, watched, spin.stop_asked);
-  }();
+  (void)kept(spin.bench.keep_prompt(prompt_not), prompt_not, watched);  // only to tell a refusal
+  RunResult run = record_run(spin.bench, order, watched, spin.stop_asked);
   std::vector<results::StepMean> held = results::reduce(results::read_run(run.file));
   std::erase_if(held, [](const results::StepMean& step) { return !std::isfinite(step.thrust_n); });
   return {std::move(run), std::move(held)};

@@ -45,6 +45,46 @@ class OneRun : public testing::Test {
   test::SaidLines said_;
 };
 
+/// Tells whether real-time priority is held.
+class PromptBench final : public WrappedBench {
+ public:
+  using WrappedBench::WrappedBench;
+  [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string&) override {
+    auto handle = std::make_shared<int>();
+    prompt = handle;
+    ++asked;
+    return handle;
+  }
+  [[nodiscard]] results::FileLayer& files() override { return layer_; }
+  std::weak_ptr<void> prompt;
+  int asked = 0, finished = 0;
+
+ private:
+  /// A file is renamed once it is finished.
+  struct Layer final : results::FileLayer {
+    explicit Layer(PromptBench& bench) : owner(bench) {}
+    void rename(const std::filesystem::path& from, const std::filesystem::path& to) override {
+      EXPECT_TRUE(owner.prompt.expired()) << "it may compute for longer than the kernel allows";
+      ++owner.finished;
+      FileLayer::rename(from, to);
+    }
+    PromptBench& owner;
+  } layer_{*this};
+};
+
+TEST_F(OneRun, HasPriorityWhileItRunsAndNoneWhileItsFileIsFinished) {
+  PromptBench bench(config_);
+  bench.mounted("5x3", 0);
+  bool held = false;
+  (void)record_run(bench, test::first_run(campaign_, config_, file()), said_, [&] {
+    held = held || !bench.prompt.expired();
+    return false;
+  });
+  EXPECT_TRUE(held);
+  EXPECT_EQ(bench.asked, 1);
+  EXPECT_EQ(bench.finished, 1);
+}
+
 TEST_F(OneRun, RecordsZeroStepsSpinDownAndZeroInThisOrder) {
   const results::RunRecording run = recorded();
   std::vector<Phase> phases;
