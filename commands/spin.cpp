@@ -141,7 +141,7 @@ ExitCode spin(const SpinOptions& options) {
   const auto progress = view.beside(printed, bench->clock());
   std::optional<Keyboard> keys;
   const auto next_key = [&]() -> std::optional<Key> {
-    if (!keys) keys.emplace(STDIN_FILENO);  // once the question has been answered
+    if (!keys) keys.emplace(STDIN_FILENO);  // once the question has been answered; it forgets what was typed before
     if (const auto key = keys->next()) return key;
     return view.take_key();
   };

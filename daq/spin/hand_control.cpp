@@ -30,7 +30,7 @@ void HandControl::take(Key key, RadPerSec commanded) {
       target_ = std::max(target_ - settings_.step, std::min(settings_.step, settings_.start));
       return;
     case Key::hold:
-      target_ = commanded;
+      if (commanded > RadPerSec(0)) target_ = commanded;  // before it turns there is nothing to hold
       return;
     case Key::stop:
       why_ = "a key was pressed";

@@ -21,6 +21,12 @@ class HandControl final : public Steering {
   HandControl(const Settings& settings, std::function<std::optional<Key>()> next_key)
       : settings_(settings), next_key_(std::move(next_key)), target_(settings.start) {}
 
+  /// What was pressed until now does not count. From now on it does, also before the motor turns: stop keeps it at
+  /// rest.
+  void forget_keys() {
+    while (next_key_()) {
+    }
+  }
   [[nodiscard]] std::optional<RadPerSec> wanted(Instant now, RadPerSec commanded) override;
   [[nodiscard]] std::string why() const override { return why_; }
 

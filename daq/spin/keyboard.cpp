@@ -49,7 +49,7 @@ Keyboard::Keyboard(int descriptor) : descriptor_(descriptor) {
   raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
   raw.c_cc[VMIN] = 0;
   raw.c_cc[VTIME] = 0;
-  is_there_ = tcsetattr(descriptor, TCSAFLUSH, &raw) == 0;  // what was typed before is no key
+  is_there_ = tcsetattr(descriptor, TCSAFLUSH, &raw) == 0;  // what was typed before does not count
 }
 
 Keyboard::~Keyboard() {

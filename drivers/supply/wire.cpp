@@ -38,7 +38,7 @@ void set_option(Address& address, const Uri& uri, const std::string& key, const 
     address.model = value;
   } else if (key == "looks") {
     if (!number || *number < 1 || *number > kMostLooks)
-      uri.refuse(fmt::format("\"{}\" is no number of readings per second", value),
+      uri.refuse(fmt::format("looks={} is out of range", value),
                  fmt::format("use 1 to {}; the default is {}", kMostLooks, Address{}.looks));
     address.looks = *number;
   } else {

@@ -48,6 +48,19 @@ TEST_F(Hand, HoldsWhereTheRampIs) {
   EXPECT_EQ(rpm(hand, seconds(2), from_rpm(3210)), 3210);
 }
 
+TEST_F(Hand, HasNothingToHoldBeforeTheMotorTurns) {
+  HandControl hand = control();
+  keys_ = {Key::hold};
+  EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), 6000);
+}
+
+TEST_F(Hand, ForgetsWhatWasPressedBeforeItBegan) {
+  HandControl hand = control();
+  keys_ = {Key::up, Key::stop};
+  hand.forget_keys();
+  EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), 6000);
+}
+
 TEST_F(Hand, StopsForGoodAtTheKey) {
   HandControl hand = control(seconds(100));
   keys_ = {Key::up, Key::stop, Key::up};

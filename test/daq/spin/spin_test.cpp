@@ -105,6 +105,14 @@ TEST_F(ByHand, StopsAtAKeyDuringTheRamp) {
   EXPECT_THAT(said_.said, HasSubstr("stopping: a key was pressed"));
 }
 
+TEST_F(ByHand, DoesNotBeginToTurnAfterAKeyDuringTheZero) {
+  make();
+  keys_ = {{std::chrono::milliseconds(300), Key::stop}};
+  bench_->spoilt_motor.before_speed = [] { ADD_FAILURE() << "a speed"; };
+  EXPECT_THAT(rpm(spin(from(6000))), ElementsAre());
+  EXPECT_THAT(said_.said, HasSubstr("stopping: a key was pressed"));
+}
+
 TEST_F(ByHand, StopsWhenNobodyIsAtTheKeys) {
   make();
   (void)spin(from(6000));
