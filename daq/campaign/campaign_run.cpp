@@ -362,7 +362,7 @@ class CampaignRun {
   std::set<std::string> accepted_;  ///< names of files
   Instant accepted_at_{0};          ///< the last of them
   std::optional<MountConfirmation> mounted_;
-  std::set<std::string> refused_;  ///< what this computer does not grant, as far as the operator knows
+  std::set<std::string> refused_;  ///< what this computer did not grant; the operator was told
   CampaignResult result_;
 };
 

@@ -236,8 +236,8 @@ void Guard::notice_absence(Instant now) noexcept {
   absence_.publish({now, std::max(absent, counts ? past.lasted_s : 0.0)});
 }
 
-/// A device that seems late or a rotor that seems to stray while this computer is busy with other things, or right
-/// after it, is no fault of theirs. Called by the runner too, whose own thread is late then.
+/// While this computer is busy with other things, and right after it, a device seems late and a rotor seems to stray
+/// without being so. The runner calls this too.
 void Guard::name_absence(Trip& trip) const {
   const bool can_be_why = trip.watched == Watched::load_cell_age || trip.watched == Watched::motor_age ||
                           trip.watched == Watched::supply_age || trip.watched == Watched::speed_error ||

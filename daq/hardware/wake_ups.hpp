@@ -13,7 +13,7 @@ struct WakeUps {
   int count = 0;        ///< of each kind, one every 5 ms
   Duration with{0};     ///< the latest with the priority that was asked for
   Duration without{0};  ///< the latest of an ordinary thread
-  std::string refusal;  ///< why there is no real-time priority; empty: granted
+  std::string refusal;  ///< why real-time priority was refused; empty: granted
   bool memory_stays = false;
 };
 

@@ -15,7 +15,7 @@ bool has(const StepMean& step, QualityFlag flag) {
   return (step.quality_flags & static_cast<std::uint32_t>(flag)) != 0;
 }
 
-/// Of its drive at the voltage that it should have: a supply that sags is no property of the motor.
+/// Of its drive at the voltage that it should have: a sagging supply says nothing about the motor.
 bool at_its_end(const StepMean& step) {
   const bool sags = has(step, QualityFlag::supply_sag) || has(step, QualityFlag::supply_out_of_band);
   return (has(step, QualityFlag::drive_saturated) && !sags) || has(step, QualityFlag::derated) ||

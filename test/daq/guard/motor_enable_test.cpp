@@ -22,6 +22,7 @@ class ToldMotor : public QueueMotor {
     if (refuse) throw std::runtime_error("refused");
     told.push_back("spin " + std::to_string(static_cast<int>(speed.value())));
   }
+  void renew() noexcept override { told.push_back("renew"); }
   void emergency_stop() noexcept override { told.push_back("emergency stop"); }
   void begin_stop(const iq::StopSettings&) override { told.push_back("stop"); }
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return report; }
@@ -53,6 +54,22 @@ TEST_F(Spinning, LetsTheMotorGoWhenItGoesEvenWhenItNeverSpun) {
   motor_.told.clear();
   { const MotorEnable spin(motor_, +1, guard_); }
   EXPECT_THAT(motor_.told, ElementsAre("emergency stop"));
+}
+
+TEST_F(Spinning, RenewsTheLeaseOnlyWhileTheGuardSeesProgress) {
+  MotorEnable spin(motor_, +1, guard_);
+  spin.renew();
+  EXPECT_THAT(motor_.told, ElementsAre("renew"));
+  bench_.time.set(std::chrono::milliseconds(410));  // the guard has not looked since
+  EXPECT_THROW(spin.renew(), SafetyStop);
+  EXPECT_THAT(motor_.told, ElementsAre("renew"));
+}
+
+TEST_F(Spinning, RenewsNothingAfterATrip) {
+  MotorEnable spin(motor_, +1, guard_);
+  trip();
+  EXPECT_THROW(spin.renew(), SafetyStop);
+  EXPECT_THAT(motor_.told, ElementsAre());
 }
 
 TEST_F(Spinning, LeavesAMotorAloneThatHasConfirmedItsStop) {
