@@ -14,6 +14,9 @@ namespace kphi {
 /// Nanoseconds of bench time since the clock's epoch: an Instant or a Duration as it is stored.
 using Nanoseconds = std::int64_t;
 
+/// Of the load cell.
+inline constexpr std::array<const char*, 6> kAxisNames{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
+
 /// One Net Box sample as it came, with the stamp of the datagram that brought it.
 struct LoadCellRecord {
   std::array<std::int32_t, 6> counts{};  ///< Fx Fy Fz Tx Ty Tz

@@ -37,6 +37,12 @@ std::string with_error(double value, double half_width) {
   return fmt::format("{:.{}e} ± {:.1e}", value, static_cast<int>(std::clamp(digits, 1.0, 12.0)), half_width);
 }
 
+std::string plain_with_error(double value, double half_width) {
+  if (!(half_width > 0) || !std::isfinite(half_width)) return fmt::format("{:.6g}", value);
+  const int digits = static_cast<int>(std::clamp(1 - std::floor(std::log10(half_width)), 0.0, 12.0));
+  return fmt::format("{:.{}f} ± {:.{}f}", value, digits, half_width, digits);
+}
+
 std::optional<double> parse_double(std::string_view text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

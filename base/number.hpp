@@ -20,6 +20,9 @@ void append_shortest(std::string& text, double value);
 /// "1.5500e-06 ± 1.2e-09": the value to the second digit of what follows ±; six digits where that is not positive.
 [[nodiscard]] std::string with_error(double value, double half_width);
 
+/// "1.0081 ± 0.0073": the same without an exponent, for numbers near 1. Six digits where `half_width` is not positive.
+[[nodiscard]] std::string plain_with_error(double value, double half_width);
+
 /// The whole of `text` as a number (std::from_chars), NaN and infinities included; nullopt for anything else, such as
 /// "", " 1" and "+1".
 [[nodiscard]] std::optional<double> parse_double(std::string_view text);

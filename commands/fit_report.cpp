@@ -266,6 +266,7 @@ ExitCode run_fit(const FitRequest& request) {
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const AnalysisOptions options = analysis_options(request, input, identification);
   if (input.table.empty()) input.provenance.bench = options.bench;
+  if (options.bench.calibration_note.empty()) input.provenance.cell_weighed.clear();
   fitted.analysis = analyse(identification, options);
   if (identification.alone()) return run_K_T_alone(request, input, fitted);
   fs::create_directories(folder);
@@ -273,6 +274,8 @@ ExitCode run_fit(const FitRequest& request) {
   write_output(file, text);
   print_findings(request, input, fitted, file);
   print_doubts(file.string(), doubts_of(identification));
+  if (!input.provenance.cell_weighed.empty())
+    fmt::print(stderr, "calibration   {}; in the ±, not corrected\n", input.provenance.cell_weighed);
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   std::vector<fs::path> written{file};
   if (!request.no_report) {

@@ -16,6 +16,7 @@
 #include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/journal.hpp"
+#include "results/reduction/weighing.hpp"
 #include "results/steps_csv.hpp"
 #include "results/version.hpp"
 
@@ -41,14 +42,15 @@ void require_unchanged(const results::CampaignFolder& folder, const results::Jou
 }
 
 /// Rejected runs, accepted ones with the checksums the journal holds, and when the last of them ended; without a
-/// journal the files as they lie there.
-void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
+/// journal the files as they lie there. Returns what the journal says of the load cell.
+std::string take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
   if (!fs::exists(folder.journal())) {
     for (const fs::path& run : folder.complete_runs())
       provenance.runs.push_back(
           {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
-    return;
+    return {};
   }
+  std::string load_cell;
   const results::JournalReading journal = results::read_journal(folder.journal());
   require_unchanged(folder, journal);
   for (const results::JournalEntry& entry : journal.entries) {
@@ -56,12 +58,31 @@ void take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
       const bool is_text = entry.data.contains(key) && entry.data[key].is_string();
       return is_text ? entry.data[key].get<std::string>() : std::string("unknown");
     };
+    if (entry.event == results::kCampaignStarted) load_cell = text("load_cell");
     if (entry.event == results::kRunAborted) provenance.rejected.push_back({text("run"), entry.utc, text("reason")});
     if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
       continue;
     provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
     provenance.measured_utc = entry.utc;
   }
+  return load_cell;
+}
+
+/// A weighing of this bench beside the campaign folder, if it was of the same cell.
+void take_weighing(const fs::path& folder, const profiles::BenchConfig& bench, const std::string& load_cell,
+                   FitInput& input) {
+  const fs::path beside = (fs::absolute(folder) / ".").lexically_normal().parent_path().parent_path();
+  const auto found = results::nearest_weighing(beside, bench.name, bench.thrust_axis, input.provenance.measured_utc);
+  if (!found) return;
+  const std::string when = fmt::format("weighed with {:g} kg on {}", found->mass_kg, found->weighed_utc.substr(0, 10));
+  if (load_cell.find(found->cell_serial + ",") == std::string::npos) {
+    fmt::print(stderr, "calibration   {} was cell {}, the campaign has another ({}): not taken\n", when,
+               found->cell_serial, load_cell);
+    return;
+  }
+  const results::CellCheck check = results::check_of(*found);
+  input.u_calibration = check.u_calibration();
+  input.provenance.cell_weighed = fmt::format("{}: {}", when, results::gain_words(*found, check));
 }
 
 FitInput campaign_input(const fs::path& path) {
@@ -75,10 +96,12 @@ FitInput campaign_input(const fs::path& path) {
   input.campaign = true;
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
-  take_runs(folder, input.provenance);
+  const std::string load_cell = take_runs(folder, input.provenance);
   if (fs::exists(folder.bench_file())) {
-    const auto gain = profiles::load_bench(folder.bench_file().string()).iq.clock_gain;
+    const profiles::BenchConfig bench = profiles::load_bench(folder.bench_file().string());
+    const auto& gain = bench.iq.clock_gain;
     input.provenance.clock = gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
+    take_weighing(path, bench, load_cell, input);
   }
   if (fs::exists(folder.campaign_file())) {
     const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
@@ -125,6 +148,8 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
   AnalysisOptions options;
   if (const auto& air = identification.air) options.bench.air_density = air->u / air->value;
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
+  options.bench.cell_calibration = input.u_calibration;
+  options.bench.calibration_note = input.provenance.cell_weighed;
   return options;
 }
 
@@ -151,7 +176,12 @@ FittedFolder fitted_again(const std::string& folder) {
   const RecordedFit record = read_recorded_fit(file.string());
   Identification identification = identify(input.steps, record.options);
   AnalysisOptions options = analysis_options(input, identification);
-  if (record.bench) options.bench = *record.bench;
+  if (record.bench) {
+    const BenchUncertainty found = std::exchange(options.bench, *record.bench);
+    // The file has the number alone.
+    if (found.cell_calibration == options.bench.cell_calibration)
+      options.bench.calibration_note = found.calibration_note;
+  }
   input.provenance.bench = options.bench;
   Analysis analysis = analyse(identification, options);
   return {std::move(input), {std::move(identification), std::move(analysis)}};

@@ -25,13 +25,15 @@ struct FitInput {
   std::filesystem::path folder;  ///< where the outputs go
   bool campaign = false;         ///< `folder` is a campaign folder
   bool mounted_once = false;     ///< one mounting for all repetitions of an occlusion
+  std::optional<double> u_calibration{};  ///< relative, of the load cell, by the weighing in provenance.cell_weighed
 };
 
 /// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming
 /// the next move, if there are neither steps nor coefficients.
 [[nodiscard]] FitInput load_input(const std::string& path, const std::string& unit_of_k = {});
 
-/// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments.
+/// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments, the
+/// load cell's from a weighing of its bench beside it.
 [[nodiscard]] fit::AnalysisOptions analysis_options(const FitInput& input, const fit::Identification& identification);
 
 /// A folder with steps and coefficients, fitted and judged again as its coefficients.yaml says.

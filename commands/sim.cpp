@@ -54,6 +54,10 @@ profiles::BenchConfig load_simulated(const SimRequest& options) {
   if (!bench.simulation) refuse(bench.path, "a real bench cannot be simulated; add a `simulation` section");
   if (bench.simulation->in_process)
     refuse(bench.path, "`simulation.in_process` needs no server; start `kphi run` directly");
+  if (bench.simulation->control.empty())
+    refuse(bench.path,
+           "without `simulation.control` a simulator of another make is meant; add control: a path for the "
+           "socket of this one");
   if (bench.thrust_axis != 2 || bench.thrust_sign != 1 || bench.iq.spin != 1) {
     refuse(bench.path,
            "the simulated propellers pull along +Fz and spin counter-clockwise; set `thrust_axis: +Fz` and "

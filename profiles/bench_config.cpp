@@ -99,6 +99,8 @@ SimulatedStand read_stand(const ProfileReader& file) {
   stand.zero_walk_n = file.find<double>(at + "/zero_walk_n");
   stand.slow_noise_n = file.get_or(at + "/slow_noise_n", stand.slow_noise_n);
   stand.slow_noise_s = file.get_or(at + "/slow_noise_s", stand.slow_noise_s);
+  stand.cell_gain = file.get_or(at + "/cell_gain", stand.cell_gain);
+  stand.cell_hysteresis = file.get_or(at + "/cell_hysteresis", stand.cell_hysteresis);
   for (std::size_t i = 0; file.has(fmt::format("{}/plates/{}", at, i)); ++i) {
     const std::string plate = fmt::format("{}/plates/{}/", at, i);
     stand.plates.push_back(
@@ -123,9 +125,6 @@ Simulation read_simulation(ProfileReader& file, const std::filesystem::path& fol
       std::ranges::any_of(simulation.stand.plates, [](const auto& plate) { return plate.repetition.has_value(); }))
     file.refuse("/simulation/stand/plates", "a bench that lives through the campaign does not know its repetitions",
                 "leave repetition out, or set in_process: true without faults");
-  if (!simulation.in_process && simulation.control.empty()) {
-    file.refuse("/simulation", "control is missing", "add control: a path for the socket, or in_process: true");
-  }
   return simulation;
 }
 

@@ -71,6 +71,7 @@ struct SimulatedStand {
   double bend = 0, rise_per_krad_s = 0, mounting = 0;
   std::optional<double> zero_walk_n;  ///< after one minute
   double slow_noise_n = 0, slow_noise_s = 1;
+  double cell_gain = 1, cell_hysteresis = 0;
   std::vector<Plate> plates;
 };
 

@@ -184,6 +184,9 @@ class Bench {
   }
   /// Tells a simulated bench what was mounted. Throws DeviceError.
   virtual void mounted(const std::string& propeller_id, double occlusion_deg) = 0;
+  /// Tells a simulated bench which force a weight has along an axis of the cell (0..2), N; 0: it was taken off. Throws
+  /// DeviceError.
+  virtual void hung(int axis, double newtons) = 0;
 };
 
 /// Connects to the devices of the bench file. `stop_asked` is checked before anything is switched on. Throws

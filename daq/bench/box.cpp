@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kSlots = 16;
 
-constexpr std::array kAxes{"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 
 const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "N m"; }
 
@@ -71,23 +70,23 @@ std::optional<StreamEvent> configuration_event(const netbox::Configuration& befo
 std::optional<std::string> noise(const netbox::ZeroMeasurement& zero, std::size_t axis, double limit) {
   const double deviation = zero.standard_deviation[axis];
   if (deviation <= limit) return std::nullopt;  // written so that NaN is refused
-  return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxes[axis], deviation, limit,
+  return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxisNames[axis], deviation, limit,
                      fmt::arg("unit", unit_of(axis)));
 }
 
 std::optional<std::string> unrest(const netbox::ZeroMeasurement& before) {
   if (before.records < 2) return "no valid sample arrived";
-  for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis)
     if (auto why = noise(before, axis, axis < 3 ? kNoisyForce : kNoisyTorque)) return why;
   return std::nullopt;
 }
 
 std::optional<std::string> beyond_zero(const netbox::ZeroMeasurement& after, const netbox::BiasTolerance& tolerance) {
   if (after.records < 2) return "no valid sample arrived afterwards";
-  for (std::size_t axis = 0; axis < kAxes.size(); ++axis) {
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis) {
     const double allowed = axis < 3 ? tolerance.force_n : tolerance.torque_nm;
     if (std::abs(after.mean[axis]) < allowed) continue;
-    return fmt::format("{} is {:.4g} {unit} afterwards, limit {:g} {unit}", kAxes[axis], after.mean[axis], allowed,
+    return fmt::format("{} is {:.4g} {unit} afterwards, limit {:g} {unit}", kAxisNames[axis], after.mean[axis], allowed,
                        fmt::arg("unit", unit_of(axis)));
   }
   return std::nullopt;

@@ -1,16 +1,33 @@
-// Questions to somebody who is near the propeller.
+// Somebody is near the propeller: the state that the stand is in meanwhile, and questions to that person.
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "daq/bench/bench.hpp"
 #include "daq/campaign/operator.hpp"
+#include "daq/guard/rest_guard.hpp"
 
 namespace kphi::daq {
 
-/// Asks only once the rotor is seen at rest, without power if kphi controls the supply, while a RestGuard watches. The
-/// power stays off. `ask` gets one sentence on the state of motor and supply. Throws SafetyStop, Interrupted, and what
+/// The rotor was seen at rest, is without power if kphi controls the supply, and a RestGuard watches it while this
+/// lives. The power stays off afterwards.
+class StandAtRest {
+ public:
+  /// Waits until the rotor is at rest. Throws SafetyStop, Interrupted.
+  StandAtRest(Bench& bench, const std::function<bool()>& stop_asked);
+  /// Throws SafetyStop once the rotor turned, or could. Any thread.
+  void check() const { guard_->check(); }
+  /// One sentence on motor and supply, for whoever comes near.
+  [[nodiscard]] std::string condition() const;
+
+ private:
+  std::optional<RestGuard> guard_;
+  bool has_power_ = true;
+};
+
+/// Asks while the stand is at rest. `ask` gets the sentence of its condition. Throws SafetyStop, Interrupted, and what
 /// `ask` throws.
 [[nodiscard]] MountConfirmation ask_at_the_stand(
     Bench& bench, Operator& person, const std::function<bool()>& stop_asked,

@@ -285,10 +285,17 @@ std::shared_ptr<void> LiveBench::run_periodically(const ThreadRole& role, std::f
 Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }
 
 void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {
+  tell_simulation(fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
+}
+
+void LiveBench::hung(int axis, double newtons) {
+  tell_simulation(fmt::format("hang {} {}", "xyz"[axis], newtons));
+}
+
+void LiveBench::tell_simulation(const std::string& line) {
   if (!config_.simulation || config_.simulation->control.empty()) return;
-  const std::string answer =
-      sim::tell(config_.simulation->control, fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
-  if (!answer.starts_with("ok")) throw DeviceError("simulated bench", "mount", answer);
+  const std::string answer = sim::tell(config_.simulation->control, line);
+  if (!answer.starts_with("ok")) throw DeviceError("simulated bench", line.substr(0, line.find(' ')), answer);
 }
 
 }  // namespace kphi::daq

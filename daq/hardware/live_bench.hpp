@@ -94,12 +94,15 @@ class LiveBench final : public Bench {
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
+  void hung(int axis, double newtons) override;
   [[nodiscard]] bool switch_off_power() override { return power_.off(motor_); }
   void restore_power() override { power_.restore(motor_, clock_); }
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
   [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string& why_not) override;
 
  private:
+  /// To the control line of a simulated bench that has one. Throws DeviceError.
+  void tell_simulation(const std::string& line);
   /// The last check before its output comes on. Throws Interrupted, SafetyStop.
   [[nodiscard]] SupplyLink* supply_to_switch_on(const std::function<bool()>& stop_asked);
 

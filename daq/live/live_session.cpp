@@ -73,7 +73,7 @@ LiveSession::LiveSession(const LiveOptions& options, Subject subject) : subject_
   settings.page = page_text();
   settings.hello = hello_message(subject_);
   settings.can_stop = !subject_.replay;
-  settings.can_steer = subject_.by_hand;
+  settings.can_steer = subject_.by_hand || subject_.weighs;
   server_ = std::make_unique<Server>(std::move(settings), feed_);
 }
 

@@ -76,12 +76,12 @@ class LiveSession {
   /// A progress for `behind` and the live view. `behind`, `clock` and this must outlive it.
   [[nodiscard]] std::unique_ptr<Progress> beside(Progress& behind, const Clock& clock);
 
-  /// Does the work, and shows its end on the pages.
+  /// Does the work, and shows its end on the pages: in these words, which the work may set, or those of its exception.
   template <class Work>
-  auto tell_the_end(Work&& work) {
+  auto tell_the_end(Work&& work, const std::string& words = "finished") {
     try {
       auto result = work();
-      end(true, "finished");
+      end(true, words);
       return result;
     } catch (const std::exception& e) {
       end(false, e.what());

@@ -1,8 +1,8 @@
 // The messages for pages and plotters: one JSON object each. Units are in the keys; an unknown or stale number is null.
 //
-//   hello    once, first: format "kphi-live/2", replay (bool), by_hand (bool), name, propeller, speed_max_rpm, limits
-//   as in `limits` history  once, second: trace [[time_s, thrust_n, commanded_rpm, speed_rpm], …], messages [limits,
-//   step, line, stop,
+//   hello    once, first: format "kphi-live/2", replay (bool), by_hand (bool), weighs (bool), name, propeller,
+//            speed_max_rpm, limits as in `limits`
+//   history  once, second: trace [[time_s, thrust_n, commanded_rpm, speed_rpm], …], messages [limits, step, line, stop,
 //            end, …]
 //   limits   the guard's limits from now on: limits [{key, name, unit, limit, lower (bool), source}]
 //   tick     30 times a second: time_s, progress (0 to 1), remaining_s, propeller, phase ("" in a step), step (0-based,
@@ -16,7 +16,7 @@
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text
 //
-// A page sends "stop"; where the motor is turned by hand also "up", "down", "hold".
+// A page sends "stop"; where the motor is turned by hand also "up", "down", "hold"; where a mass is weighed "hold".
 #pragma once
 
 #include <cstdint>
@@ -39,7 +39,8 @@ struct Subject {
   double speed_max_rpm = 0;        ///< of the profile: the top of the speed axis
   Seconds minimum_discard;         ///< at the start of every step, not averaged
   std::vector<GuardLimit> limits;  ///< until a guard publishes its own
-  bool by_hand = false;            ///< pages may press keys
+  bool by_hand = false;            ///< pages may press up, down and hold
+  bool weighs = false;             ///< no motor: pages say that the mass is on or off, by hold
 };
 
 /// `devices`: their reported limits; nullptr: limits of the files only.

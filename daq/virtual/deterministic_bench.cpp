@@ -37,6 +37,8 @@ void take_stand(const profiles::SimulatedStand& stand, int repetition, sim::Plan
   if (stand.zero_walk_n) plant.load_cell.walk_per_root_minute[2] = *stand.zero_walk_n;
   plant.load_cell.slow_noise = stand.slow_noise_n;
   plant.load_cell.slow_noise_seconds = stand.slow_noise_s;
+  plant.load_cell.gain = stand.cell_gain;
+  plant.load_cell.hysteresis = stand.cell_hysteresis;
 }
 
 /// Throws DeviceError, as the true transport would.
@@ -234,6 +236,8 @@ void DeterministicBench::mounted(const std::string& propeller_id, double occlusi
     throw DeviceError("simulated bench", "mount", e.what());
   }
 }
+
+void DeterministicBench::hung(int axis, double newtons) { sim_->hang(axis, newtons); }
 
 results::LoadCellScale DeterministicBench::start() {
   connection_.reset();

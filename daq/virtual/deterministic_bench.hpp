@@ -60,6 +60,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return *files_; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::seconds(1); }
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
+  void hung(int axis, double newtons) override;
   [[nodiscard]] bool switch_off_power() override { return power_->off(*motor_); }
   void restore_power() override;
 

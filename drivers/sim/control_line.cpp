@@ -29,6 +29,18 @@ std::string mount(SimulatedBench& bench, const std::string& propeller, const std
   return "ok " + bench.mounted();
 }
 
+std::string hang(SimulatedBench& bench, const std::string& axis, const std::string& force) {
+  const auto newtons = parse_double(force);
+  const std::size_t index = std::string_view("xyz").find(axis);
+  if (axis.size() != 1 || index == std::string_view::npos || !newtons) return "error expected: hang x|y|z NEWTONS";
+  try {
+    bench.hang(static_cast<int>(index), *newtons);
+  } catch (const std::invalid_argument& refusal) {
+    return std::string("error ") + refusal.what();
+  }
+  return fmt::format("ok {} {}", axis, *newtons);
+}
+
 std::string status(SimulatedBench& bench) {
   const auto& drive = bench.motor().drive();
   nlohmann::ordered_json json{{"mounted", bench.mounted()},
@@ -75,9 +87,10 @@ std::string control_answer(SimulatedBench& bench, std::string_view line) {
   std::istringstream in{std::string(line)};
   const std::vector<std::string> words(std::istream_iterator<std::string>(in), {});
   if (words.size() == 3 && words[0] == "mount") return mount(bench, words[1], words[2]);
+  if (words.size() == 3 && words[0] == "hang") return hang(bench, words[1], words[2]);
   if (words.size() == 1 && words[0] == "status") return status(bench);
   if (words.size() > 1 && words[0] == "fault") return fail(bench, words);
-  return "error unknown command; use `mount PROPELLER DEGREES`, `status` or `fault kind=supply_...`";
+  return "error unknown command; use `mount PROPELLER DEGREES`, `hang AXIS NEWTONS`, `status` or `fault kind=supply_...`";
 }
 
 std::string control_path(const std::string& configured) {

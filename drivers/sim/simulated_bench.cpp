@@ -64,6 +64,12 @@ void SimulatedBench::mount(const std::string& propeller_id, double occlusion_deg
   mounted_ = fmt::format("{} {}", propeller_id, occlusion_deg);
 }
 
+void SimulatedBench::hang(int axis, double newtons) {
+  if (axis < 0 || axis > 2) throw std::invalid_argument("a weight pulls along x, y or z");
+  if (!(std::abs(newtons) <= 1e4)) throw std::invalid_argument("a weight is within ±10 kN");
+  plant_.hang(static_cast<std::size_t>(axis), newtons);
+}
+
 void SimulatedBench::advance(Instant now) {
   for (Instant at = time_of_tick(ticks_ + 1); at <= now; at = time_of_tick(ticks_ + 1)) {
     ++ticks_;

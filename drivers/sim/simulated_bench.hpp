@@ -43,6 +43,8 @@ class SimulatedBench {
   /// Occlusion in degrees, [0, 360). Throws std::invalid_argument for an unknown propeller, an angle out of range, or
   /// while the shaft turns faster than 5 rad/s.
   void mount(const std::string& propeller_id, double occlusion_deg);
+  /// A weight pulls along x, y or z (0..2), N; 0: none. Throws std::invalid_argument.
+  void hang(int axis, double newtons);
   /// "5x3 90"; empty for the bare motor, as after power-up.
   [[nodiscard]] std::string mounted() const { return mounted_; }
 

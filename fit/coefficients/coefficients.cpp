@@ -162,6 +162,7 @@ std::string provenance_block(const Fitted& fitted, const Provenance& provenance)
     text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
                           : "  motor_clock: unchecked\n";
   }
+  if (!provenance.cell_weighed.empty()) text += fmt::format("  cell_weighed: {}\n", quoted(provenance.cell_weighed));
   if (provenance.runs.empty()) return text + "  runs: []\n";
   text += "  runs:\n";
   for (const RunProvenance& run : provenance.runs)

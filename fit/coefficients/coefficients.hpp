@@ -46,6 +46,7 @@ struct Provenance {
   std::optional<double> supply_v;
   std::optional<MotorClock> clock;  ///< of a campaign
   std::vector<RejectedRun> rejected{};
+  std::string cell_weighed{};  ///< one line: when, with what, and what it said of the load cell; empty: it was not
   std::optional<BenchUncertainty> bench{};  ///< of the budget
 };
 

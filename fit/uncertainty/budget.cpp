@@ -66,7 +66,8 @@ void add_common(ErrorSources& sources, const char* name, const char* option, con
 }
 
 void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
-  add_common(sources, "cell calibration", "calibration", bench.cell_calibration, 1);
+  add_common(sources, "cell calibration", "calibration", bench.cell_calibration, 1, "1",
+             bench.calibration_note.c_str());
   add_common(sources, "cross-axis", "cross-axis", bench.cross_axis, 1);
   // cos α = 1 − α²/2: no first order. The standard deviation of α²/2 is u²/√2.
   add_common(sources, "alignment", "alignment-deg", bench.alignment_rad,
@@ -151,6 +152,7 @@ void set_uncertainty(BenchUncertainty& bench, const std::string& text) {
   for (const Entry& entry : kEntries) {
     if (text.substr(0, equals) != entry.name || !(value >= 0)) continue;
     bench.*entry.member = value * entry.unit;
+    if (entry.member == &BenchUncertainty::cell_calibration) bench.calibration_note.clear();
     return;
   }
   throw ConfigurationError(

@@ -57,6 +57,7 @@ struct Budget {
 /// the budget without a value and not taken as zero.
 struct BenchUncertainty {
   std::optional<double> cell_calibration;  ///< relative, of the load cell's sensitivity
+  std::string calibration_note{};          ///< where that comes from, for the budget; may be empty
   std::optional<double> cross_axis;        ///< relative to the thrust, what other loads make the cell read
   std::optional<double> alignment_rad;     ///< between thrust and the cell's axis
   std::optional<double> motor_clock;       ///< relative, of the clock behind the speed of the motor module

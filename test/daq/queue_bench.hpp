@@ -104,6 +104,7 @@ class QueueBench : public Bench, private LoadCellLink {
   [[nodiscard]] results::FileLayer& files() override { return *layer; }
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
+  void hung(int, double) override {}
   [[nodiscard]] bool switch_off_power() override { return false; }
   void restore_power() override {}
 

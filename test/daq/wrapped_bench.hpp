@@ -21,6 +21,7 @@ class WrappedBench : public Bench {
   [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
   void restore_power() override { bench.restore_power(); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
+  void hung(int axis, double newtons) override { bench.hung(axis, newtons); }
   [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override {
     return bench.run_periodically(role, std::move(work));
   }

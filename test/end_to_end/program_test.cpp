@@ -8,6 +8,8 @@
 
 #include <array>
 #include <boost/asio.hpp>
+#include <regex>
+#include <regex>
 #include <thread>
 
 #include "results/run_reader.hpp"
@@ -40,6 +42,21 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
                      "180,180,165.676,180,1.5,1.5,1.5,1.5\n");
   EXPECT_EQ(compensate.wait(), 0) << compensate.err();
   EXPECT_THAT(compensate.out(), HasSubstr("64.8"));
+}
+
+TEST(Program, NeedsNoControlLineOfASimulatorThatIsToldByHand) {
+  const RunningBench bench;
+  (void)ran({kphi(), "sim", bench.path("bench.yaml"), "--mount", "5x3 0"});
+  const std::string foreign =
+      std::regex_replace(bytes_of(bench.path("bench.yaml")), std::regex(", control: [^,}]*"), "");
+  write(bench.path("foreign.yaml"), foreign);
+  write(bench.path("one.yaml"), short_campaign_text("0"));
+  const std::string folder = ran({kphi(), "run", bench.path("one.yaml"), "--bench", bench.path("foreign.yaml"), "--yes",
+                                  "--out", bench.path("f")})
+                                 .folder();
+  EXPECT_NE(bytes_of(std::filesystem::path(folder) / "steps.csv"), "");
+  EXPECT_THAT(ran({kphi(), "sim", bench.path("foreign.yaml")}, 2).err,
+              HasSubstr("a simulator of another make is meant"));
 }
 
 TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {

@@ -64,6 +64,7 @@ inline const std::vector<Room>& rooms() {
       {"daq/run", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/campaign", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/spin", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
+      {"daq/weigh", {"base", "compensation/units.hpp", "profiles", "results", "drivers", "daq"}},
       {"daq/live", {"base", "compensation/units.hpp", "profiles", "results", "daq"}},
       {"daq", {"base", "profiles", "daq"}},
 

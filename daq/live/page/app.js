@@ -119,6 +119,7 @@ function showNumbers() {
   text('left', clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
+  if (state.hello.weighs && tick.phase === 'measuring' && !state.ended) banner('', 'Measuring.', 'Hands off.');
   showReadings(tick);
   showLimits(tick);
 }
@@ -217,7 +218,7 @@ function stop() {
   banner('', 'STOP sent.', 'Waiting for kphi to confirm.');
 }
 
-const steers = () => state.hello && state.hello.by_hand && !state.ended && link && link.readyState === WebSocket.OPEN;
+const steers = () => state.hello && (state.hello.by_hand || state.hello.weighs) && !state.ended && link && link.readyState === WebSocket.OPEN;
 const kSteering = { ArrowUp: 'up', ArrowDown: 'down', Enter: 'hold' };
 for (const word of Object.values(kSteering)) at(word).addEventListener('click', () => { if (steers()) link.send(word); });
 
@@ -242,8 +243,11 @@ const take = {
     text('name', message.name);
     text('what', message.propeller + (message.replay ? ' · replay of a recorded run' : ''));
     at('lines').replaceChildren();
-    at('hand').hidden = !message.by_hand;
-    document.body.classList.toggle('hand', message.by_hand);
+    at('hand').hidden = !message.by_hand && !message.weighs;
+    document.body.classList.toggle('hand', message.by_hand || message.weighs);
+    document.body.classList.toggle('weigh', message.weighs);
+    text('hold', message.weighs ? 'done ⏎' : 'hold ⏎');
+    for (const heading of document.querySelectorAll('.of_cell')) heading.textContent = message.weighs ? 'Load' : 'Thrust';
     makeLimits(message.limits);
     makeCharts();
     banner('', '', '');
@@ -260,7 +264,10 @@ const take = {
   },
   limits(message) { makeLimits(message.limits); },
   step(message) { state.steps.push(message); state.stepsDue = true; },
-  line(message) { addLine(message.time_s, message.text); },
+  line(message) {
+    addLine(message.time_s, message.text);
+    if (state.hello.weighs) banner('', message.text, '');
+  },
   stop(message) {
     state.asked = true;
     addLine(message.time_s, 'STOP pressed on this page');
@@ -271,8 +278,9 @@ const take = {
     state.ended = true;
     state.numbersDue = true;
     addLine(message.time_s, message.text);
-    const replay = state.hello.replay;
-    banner(message.well ? 'good' : state.asked ? '' : 'bad', message.well ? (replay ? 'The replay is over.' : 'Campaign finished.') : 'The run is over.', message.well ? '' : message.text);
+    const { replay, by_hand, weighs } = state.hello;
+    const well = replay ? 'The replay is over.' : weighs ? 'Weighed.' : by_hand ? 'The motor is at rest.' : 'Campaign finished.';
+    banner(message.well || state.asked ? 'good' : 'bad', message.well ? well : state.asked ? 'Stopped as asked.' : 'The run is over.', message.well ? (weighs ? message.text : '') : message.text);
     showStop();
   },
 };

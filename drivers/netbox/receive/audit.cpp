@@ -6,12 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "base/device_data.hpp"
+
 namespace kphi::netbox {
 namespace {
 
 using Findings = std::vector<Finding>;
 
-constexpr const char* kAxes[] = {"Fx", "Fy", "Fz", "Tx", "Ty", "Tz"};
 const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "N m"; }
 
 void check_stream(const Configuration& box, const Intention& intention, Findings& found) {
@@ -50,7 +51,7 @@ void check_scale(const Configuration& box, const Intention& intention, Findings&
   const double expected = intention.largest_thrust_n, range = box.range[axis];
   if (expected > 0.8 * range)
     found.push_back({expected >= range ? Severity::fault : Severity::warning,
-                     fmt::format("{:g} N expected on {}, its range is {:g} N", expected, kAxes[axis], range),
+                     fmt::format("{:g} N expected on {}, its range is {:g} N", expected, kAxisNames[axis], range),
                      "choose a calibration with a larger range on the box's Configurations page, or lower the speeds"});
 }
 
@@ -100,7 +101,7 @@ void check_extras(const Configuration& box, Findings& found) {
   std::vector<std::string> list;
   for (const MonitorCondition& c : *box.monitor_conditions) {
     const auto axis = static_cast<std::size_t>(c.axis);
-    list.push_back(fmt::format("{} {} {:g} {}", kAxes[axis], c.above ? '>' : '<', c.threshold, unit_of(axis)));
+    list.push_back(fmt::format("{} {} {:g} {}", kAxisNames[axis], c.above ? '>' : '<', c.threshold, unit_of(axis)));
   }
   found.push_back({Severity::note,
                    fmt::format("the box checks these monitor conditions at 7 kHz: {}", fmt::join(list, ", ")),

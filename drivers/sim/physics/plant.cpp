@@ -37,18 +37,33 @@ void LoadCell::step(double speed, double reaction_torque, Random& random) noexce
   const double blade_cosine = three ? double_cosine * cosine_ - double_sine * sine_ : double_cosine;
 
   const double once = parameters_.once_per_turn * swing;
-  const double fz = thrust_ + once * cosine_ + blade_amplitude_ * swing * blade_cosine;
+  const auto [weight_x, weight_y, weight_z] = weight();
+  const double fz = weight_z + thrust_ + once * cosine_ + blade_amplitude_ * swing * blade_cosine;
   const double tz = reaction_torque * (1 + 0.02 * blade_cosine);
   // Cross-talk of the cell, and a thrust axis that misses the cell's centre by about a millimetre.
-  const double fx = once * cosine_ + 0.004 * fz;
-  const double fy = once * sine_ - 0.003 * fz;
+  const double fx = weight_x + once * cosine_ + 0.004 * fz;
+  const double fy = weight_y + once * sine_ - 0.003 * fz;
   const Wrench load{fx, fy, fz + 0.002 * once * sine_, 0.0010 * fz, -0.0008 * fz, tz};
 
   if (++ticks_ % kTicksPerDrift == 0) drift(random);
   for (std::size_t axis = 0; axis < load.size(); ++axis) {
-    reading_[axis] = load[axis] + zero_[axis] + parameters_.noise[axis] * random.normal();
+    reading_[axis] = parameters_.gain * load[axis] + zero_[axis] + parameters_.noise[axis] * random.normal();
   }
   reading_[2] += slow_noise_;
+}
+
+void LoadCell::hang(std::size_t axis, double newtons) noexcept {
+  if (axis != weight_axis_) largest_weight_ = 0;
+  weight_axis_ = axis;
+  weight_ = newtons;
+  if (std::abs(newtons) > std::abs(largest_weight_)) largest_weight_ = newtons;
+}
+
+/// Read on x, y and z: on the way back from its largest, a weight reads too much.
+std::array<double, 3> LoadCell::weight() const noexcept {
+  std::array<double, 3> read{};
+  read[weight_axis_] = weight_ + parameters_.hysteresis * (largest_weight_ - weight_);
+  return read;
 }
 
 void LoadCell::rotate(double speed) noexcept {

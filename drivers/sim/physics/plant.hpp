@@ -28,6 +28,8 @@ struct LoadCellParameters {
   Wrench zero_spread{0.3, 0.3, 0.4, 5e-3, 5e-3, 3e-3};              ///< zero offset of a power-up: uniform within ±
   Wrench drift_per_minute{8e-4, -6e-4, 2e-3, 2e-5, -2e-5, 1e-5};    ///< linear
   Wrench walk_per_root_minute{2e-4, 2e-4, 4e-4, 6e-6, 6e-6, 6e-6};  ///< random walk: deviation after one minute
+  double gain = 1;                    ///< of all axes: what it reads per true load
+  double hysteresis = 0;              ///< share of the largest weight that hung on it, read once it is gone
   double slow_noise = 0;              ///< deviation in Fz, N, of noise with a memory of slow_noise_seconds
   double slow_noise_seconds = 1;      ///< its correlation falls to 1/e in this time
   double once_per_turn = 0.015;       ///< amplitude in Fz, as a share of the unoccluded thrust; Fx, Fy the same
@@ -49,6 +51,8 @@ class LoadCell {
  public:
   LoadCell(const LoadCellParameters& parameters, Random& random) noexcept;
   void load(const AirLoad& air) noexcept;
+  /// A weight pulls along one axis, 0..2, N, in the place of any before it; 0: none.
+  void hang(std::size_t axis, double newtons) noexcept;
   /// One tick: the cell's reading at this speed (rad/s) and reaction torque (N m).
   void step(double speed, double reaction_torque, Random& random) noexcept;
   [[nodiscard]] const Wrench& reading() const noexcept { return reading_; }
@@ -57,12 +61,15 @@ class LoadCell {
 
  private:
   void rotate(double speed) noexcept;
+  [[nodiscard]] std::array<double, 3> weight() const noexcept;
   void drift(Random& random) noexcept;
 
   LoadCellParameters parameters_;
   AirLoad air_;
   Wrench zero_{};
   double slow_noise_ = 0;  ///< N, now
+  std::size_t weight_axis_ = 2;
+  double weight_ = 0, largest_weight_ = 0;  ///< N; the second by its magnitude, with its sign
   Wrench reading_{};
   double thrust_ = 0;
   double cosine_ = 1, sine_ = 0;  ///< of the rotor angle
@@ -88,6 +95,8 @@ class Plant {
   /// See Motor::power.
   void power(BusSource source) { motor_.power(std::move(source)); }
   void upset(const MotorUpset& upset) noexcept { motor_.upset(upset); }
+  /// See LoadCell::hang.
+  void hang(std::size_t axis, double newtons) noexcept { load_cell_.hang(axis, newtons); }
 
   [[nodiscard]] const MotorState& motor() const noexcept { return motor_.state(); }
   [[nodiscard]] const Wrench& reading() const noexcept { return load_cell_.reading(); }

@@ -91,6 +91,24 @@ TEST(SimulatedBench, MotorCoastsWhenItsMasterFallsSilent) {
   EXPECT_EQ(bench.motor().drive().mode, MotorDrive::Mode::coast);
 }
 
+TEST(SimulatedBench, ReadsAWeightByItsGainAndKeepsAShareOfItOnceItIsGone) {
+  BenchSettings settings;
+  settings.plant.load_cell = {
+      .noise = {}, .drift_per_minute = {}, .walk_per_root_minute = {}, .gain = 1.02, .hysteresis = 0.01};
+  SimulatedBench bench(settings);
+  bench.advance(10ms);
+  const double zero = bench.plant().reading()[2];
+  const auto read = [&](double newtons, Instant at) {
+    bench.hang(2, newtons);
+    bench.advance(at);
+    return bench.plant().reading()[2] - zero;
+  };
+  EXPECT_NEAR(read(5, 20ms), 1.02 * 5, 1e-9);
+  EXPECT_NEAR(read(0, 30ms), 1.02 * 0.05, 1e-9);
+  EXPECT_NEAR(read(5, 40ms), 1.02 * 5, 1e-9);
+  EXPECT_NEAR(read(2.5, 50ms), 1.02 * 2.525, 1e-9);
+}
+
 TEST(SimulatedBench, MountsOnlyWhatItOwnsAndOnlyAtRest) {
   SimulatedBench bench(BenchSettings{});
   EXPECT_EQ(bench.mounted(), "");
@@ -119,6 +137,9 @@ TEST(ControlLine, MountsAndReports) {
   EXPECT_EQ(control_answer(bench, "mount 5x3 90"), "ok 5x3 90");
   EXPECT_EQ(control_answer(bench, "  mount  6x2 22.5\r"), "ok 6x2 22.5");
   EXPECT_EQ(bench.mounted(), "6x2 22.5");
+  EXPECT_EQ(control_answer(bench, "hang z -4.9"), "ok z -4.9");
+  for (const char* line : {"hang q 1", "hang xy 1", "hang z heavy", "hang z 1e9", "hang z", "hang z nan"})
+    EXPECT_EQ(control_answer(bench, line).substr(0, 6), "error ") << line;
   EXPECT_EQ(control_answer(bench, "mount 5x4 90").substr(0, 6), "error ");
   EXPECT_EQ(control_answer(bench, "mount 5x3 ninety").substr(0, 6), "error ");
   EXPECT_EQ(control_answer(bench, "mount 5x3").substr(0, 6), "error ");
