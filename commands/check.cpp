@@ -61,13 +61,17 @@ std::string summary_of(const BenchConfig& bench) {
           ? fmt::format("in process, seed {}", bench.simulation->seed)
           : fmt::format("{:g} times faster, seed {}", bench.simulation->time_scale, bench.simulation->seed);
   return fmt::format(
-      "  net box    {}, RDT port {}, HTTP port {}, {:g} Hz, {} records per datagram\n"
-      "  motor      {} at {} baud, module {}, spin {:+}, at most {:.6g} RPM\n"
+      "  load cell  {}, {:g} Hz{}\n"
+      "  motor      {} at {} baud{}, spin {:+}, at most {:.6g} RPM\n"
       "  thrust     along {}F{}\n"
       "  simulated  {}\n",
-      bench.netbox.host, bench.netbox.rdt_port, bench.netbox.http_port, bench.netbox.rate_hz,
-      bench.netbox.records_per_datagram, bench.iq.device, bench.iq.baud, bench.iq.module_id, bench.iq.spin,
-      to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis], simulated);
+      profiles::load_cell_words(bench), bench.netbox.rate_hz,
+      bench.load_cell ? ""
+                      : fmt::format(", RDT port {}, HTTP port {}, {} records per datagram", bench.netbox.rdt_port,
+                                    bench.netbox.http_port, bench.netbox.records_per_datagram),
+      profiles::motor_words(bench), bench.iq.baud, bench.motor ? "" : fmt::format(", module {}", bench.iq.module_id),
+      bench.iq.spin, to_rpm(bench.iq.speed_max), bench.thrust_sign > 0 ? '+' : '-', "xyz"[bench.thrust_axis],
+      simulated);
 }
 
 std::string summary_of(const Answers& answers) {

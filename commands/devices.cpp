@@ -5,6 +5,7 @@
 #include "commands/commands.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/air_source.hpp"
+#include "daq/bench/offered_drivers.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/probe.hpp"
 #include "daq/hardware/wake_ups.hpp"
@@ -170,6 +171,36 @@ WakeUps wake_ups(double seconds) {
   return measure_wake_ups(seconds);
 }
 
+/// A device of another driver: whether it connects, and what it says of itself.
+template <class Link, class Describe>
+DeviceAnswer ask_other(const std::string& name, Link&& connect, Describe&& describe) {
+  DeviceAnswer answer{name, true, {}, {}};
+  try {
+    const auto link = connect();
+    answer.lines.push_back(describe(*link));
+    answer.add(link->findings());
+  } catch (const DeviceError& error) {
+    answer.answers = false;
+    answer.lines = {std::string("fault: ") + error.what()};
+  }
+  return answer;
+}
+
+DeviceAnswer ask_other_load_cell(const profiles::BenchConfig& bench, const Clock& clock) {
+  return ask_other(
+      load_cell_words(bench), [&] { return connect_load_cell(bench, clock); },
+      [](const LoadCellLink& cell) {
+        const results::LoadCellScale scale = cell.scale();
+        return fmt::format("{}, {:g} Hz, {:g} counts/N", scale.serial, scale.sample_rate_hz, scale.counts_per_newton);
+      });
+}
+
+DeviceAnswer ask_other_motor(const profiles::BenchConfig& bench, const Clock& clock) {
+  return ask_other(
+      motor_words(bench), [&] { return connect_motor(bench, clock); },
+      [](const MotorLink& motor) { return motor.identity(); });
+}
+
 ExitCode devices(const DevicesRequest& asked) {
   std::optional<profiles::BenchConfig> bench;
   if (!asked.bench.empty()) bench = profiles::load_bench(asked.bench);
@@ -184,10 +215,14 @@ ExitCode devices(const DevicesRequest& asked) {
   profiles::NetBoxConfig factory;
   factory.host = kFactoryAddress;
   std::vector<DeviceAnswer> answers;
-  answers.push_back(ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
+  answers.push_back(bench && bench->load_cell
+                        ? ask_other_load_cell(*bench, clock)
+                        : ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
   if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
   const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
-  if (bench) answers.push_back(ask_motor(bench->iq, clock, asked.clock_gain_s, !unpowered));
+  if (bench)
+    answers.push_back(bench->motor ? ask_other_motor(*bench, clock)
+                                   : ask_motor(bench->iq, clock, asked.clock_gain_s, !unpowered));
   if (unpowered && !answers.back().answers) {
     answers.back().wanted = asked.clock_gain_s.has_value();
     answers.back().lines = {

@@ -15,6 +15,7 @@
 #include "compensation/file/coefficient_file.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/console.hpp"
+#include "examples/second_bench/offer.hpp"
 #include "profiles/schema.hpp"
 #include "results/version.hpp"
 
@@ -121,5 +122,6 @@ int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   fill_closed_streams();
+  kphi::second_bench::offer_drivers();
   return end(run(argc, argv));
 }

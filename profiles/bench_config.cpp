@@ -44,7 +44,7 @@ ClockGain read_clock_gain(const ProfileReader& file) {
           file.get_or<std::string>("/iq/clock_gain/measured_utc", "")};
 }
 
-MotorConfig read_motor(const ProfileReader& file, const std::filesystem::path& folder) {
+MotorConfig read_module(const ProfileReader& file, const std::filesystem::path& folder) {
   MotorConfig config;
   config.device = file.text("/iq/device");
   config.baud = file.get_or("/iq/baud", config.baud);
@@ -55,6 +55,44 @@ MotorConfig read_motor(const ProfileReader& file, const std::filesystem::path& f
   if (file.has("/iq/clock_gain")) config.clock_gain = read_clock_gain(file);
   if (file.has("/iq/capture")) config.capture = (folder / file.text("/iq/capture")).string();
   return config;
+}
+
+OtherDevice read_device(const ProfileReader& file, const std::string& at) {
+  OtherDevice other{file.text(at + "/driver"), file.text(at + "/device"), 115200, {}};
+  other.baud = file.get_or(at + "/baud", other.baud);
+  if (file.has(at + "/settings"))
+    for (const std::string& key : file.keys(at + "/settings"))
+      other.settings[key] = file.number(at + "/settings/" + key);
+  return other;
+}
+
+/// Of the two that name one device.
+void require_one(ProfileReader& file, const std::string& own, const std::string& other, const char* what) {
+  if (file.has("/" + own) == file.has("/" + other))
+    file.refuse(file.has("/" + own) ? "/" + other : "/name",
+                fmt::format("{} and {} are {}", own, other, file.has("/" + own) ? "both given" : "missing"),
+                fmt::format("write one of them: {}", what));
+}
+
+void read_load_cell(ProfileReader& file, BenchConfig& bench) {
+  require_one(file, "netbox", "load_cell", "netbox for an ATI Net Box, load_cell for another driver's");
+  if (file.has("/netbox")) bench.netbox = read_netbox(file);
+  if (!file.has("/load_cell")) return;
+  bench.load_cell = read_device(file, "/load_cell");
+  bench.netbox.rate_hz = file.number("/load_cell/rate_hz");
+  bench.netbox.records_per_datagram = 1;
+}
+
+void read_motor(ProfileReader& file, const std::filesystem::path& folder, BenchConfig& bench) {
+  require_one(file, "iq", "motor", "iq for an IQ module, motor for another driver's");
+  if (file.has("/iq")) bench.iq = read_module(file, folder);
+  if (!file.has("/motor")) return;
+  bench.motor = read_device(file, "/motor");
+  bench.iq.device = bench.motor->device;
+  bench.iq.baud = bench.motor->baud;
+  bench.iq.spin = file.get_or("/motor/spin", bench.iq.spin);
+  bench.iq.telemetry_hz = file.get_or("/motor/telemetry_hz", bench.iq.telemetry_hz);
+  bench.iq.speed_max = from_rpm(file.number("/motor/speed_max_rpm"));
 }
 
 SupplyConfig read_supply(ProfileReader& file) {
@@ -134,8 +172,8 @@ BenchConfig parse_bench(const std::string& text, const std::string& path) {
   ProfileReader file(text, path, FileKind::bench);
   BenchConfig bench;
   bench.name = file.text("/name");
-  bench.netbox = read_netbox(file);
-  bench.iq = read_motor(file, std::filesystem::path(path).parent_path());
+  read_load_cell(file, bench);
+  read_motor(file, std::filesystem::path(path).parent_path(), bench);
   const std::string axis = file.text("/thrust_axis");  // "+Fz"
   bench.thrust_sign = axis[0] == '-' ? -1 : +1;
   bench.thrust_axis = axis[2] - 'x';
@@ -144,10 +182,21 @@ BenchConfig parse_bench(const std::string& text, const std::string& path) {
   bench.limits = read_limits(file, "/supply/voltage_v");
   if (file.has("/ambient")) bench.ambient = read_ambient(file);
   if (file.has("/simulation")) bench.simulation = read_simulation(file, std::filesystem::path(path).parent_path());
+  if (bench.simulation && bench.simulation->in_process && (bench.load_cell || bench.motor))
+    file.refuse("/simulation/in_process", "a bench in this process has a Net Box and an IQ module",
+                "write netbox and iq, or simulate the devices of other drivers by their own simulators");
   bench.text = text;
   bench.path = path;
   file.finish();
   return bench;
+}
+
+std::string load_cell_words(const BenchConfig& bench) {
+  return bench.load_cell ? bench.load_cell->driver + " " + bench.load_cell->device : "Net Box " + bench.netbox.host;
+}
+
+std::string motor_words(const BenchConfig& bench) {
+  return bench.motor ? bench.motor->driver + " " + bench.motor->device : "IQ module " + bench.iq.device;
 }
 
 BenchConfig load_bench(const std::string& path) { return parse_bench(read_text(path), path); }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -103,20 +104,34 @@ struct AmbientConfig {
   [[nodiscard]] bool known() const noexcept { return !sensor.empty() || manual.has_value(); }
 };
 
+/// A device whose driver is not one of kphi's own: the driver knows its settings (daq/bench/offered_drivers.hpp).
+struct OtherDevice {
+  std::string driver;  ///< word by which the driver is offered
+  std::string device;  ///< serial port, as in MotorConfig
+  unsigned baud = 115200;
+  std::map<std::string, double> settings;
+};
+
 struct BenchConfig {
   std::string name;
   NetBoxConfig netbox;
   MotorConfig iq;
-  int thrust_axis = 2;                 ///< 0..2 = Fx, Fy, Fz
-  int thrust_sign = +1;                ///< sign of the axis when the propeller pulls
-  std::optional<SupplyConfig> supply;  ///< nullopt: kphi does not switch what powers the motor
-  bool supply_sinks_current = false;   ///< what powers the motor takes current back, so a run may end with a ramp
-  Limits limits;                       ///< of this stand; the campaign's hold as well
+  std::optional<OtherDevice> load_cell;  ///< instead of a Net Box, of which only the rate holds
+  std::optional<OtherDevice> motor;      ///< instead of an IQ module; what both kinds have is in iq
+  int thrust_axis = 2;                   ///< 0..2 = Fx, Fy, Fz
+  int thrust_sign = +1;                  ///< sign of the axis when the propeller pulls
+  std::optional<SupplyConfig> supply;    ///< nullopt: kphi does not switch what powers the motor
+  bool supply_sinks_current = false;     ///< what powers the motor takes current back, so a run may end with a ramp
+  Limits limits;                         ///< of this stand; the campaign's hold as well
   AmbientConfig ambient;
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim
   std::string path;
 };
+
+/// "Net Box 192.168.1.1", "IQ module /dev/ttyUSB0", "hx711 /dev/ttyACM0".
+[[nodiscard]] std::string load_cell_words(const BenchConfig& bench);
+[[nodiscard]] std::string motor_words(const BenchConfig& bench);
 
 [[nodiscard]] BenchConfig load_bench(const std::string& path);
 [[nodiscard]] BenchConfig parse_bench(const std::string& text, const std::string& path);

@@ -44,10 +44,14 @@ iq::Intention motor_intention(const profiles::Campaign& campaign, const profiles
 
 std::vector<BenchFinding> audit_load_cell(const LoadCellLink& cell, const profiles::Campaign& campaign,
                                           const profiles::BenchConfig& config) {
-  const netbox::Configuration& box = cell.configuration();
-  std::vector<Finding> findings = netbox::audit(box, intention_of(campaign, config));
-  for (auto& more : {unset(box, config.netbox.settings), cell.findings()})
-    findings.insert(findings.end(), more.begin(), more.end());
+  std::vector<Finding> findings = cell.findings();
+  const auto add = [&](const std::vector<Finding>& more) { findings.insert(findings.end(), more.begin(), more.end()); };
+  if (const netbox::Configuration* box = cell.box()) {
+    add(netbox::audit(*box, intention_of(campaign, config)));
+    add(unset(*box, config.netbox.settings));
+  } else if (campaign.box_bias) {
+    add({{Severity::fault, "box_bias of the campaign needs a Net Box", "leave it out: kphi subtracts its own zeros"}});
+  }
   put_worst_first(findings);
   std::vector<BenchFinding> found;
   for (Finding& finding : findings) found.push_back({Source::load_cell, std::move(finding)});
@@ -59,7 +63,7 @@ void refuse_faults(const std::vector<BenchFinding>& found, const profiles::Bench
   for (const auto& [device, finding] : found) {
     if (finding.severity != Severity::fault) continue;
     const std::string where =
-        device == Source::motor ? "IQ module " + config.iq.device : "Net Box " + config.netbox.host;
+        device == Source::motor ? profiles::motor_words(config) : profiles::load_cell_words(config);
     faults += (faults.empty() ? "" : "\n  ") + where + ": " + finding.words();
   }
   if (!faults.empty()) throw ConfigurationError(faults);
@@ -70,8 +74,11 @@ void refuse_faults(const std::vector<BenchFinding>& found, const profiles::Bench
 std::vector<BenchFinding> audit_bench(Bench& bench, const profiles::Campaign& campaign,
                                       const profiles::BenchConfig& config) {
   std::vector<BenchFinding> found = audit_load_cell(bench.load_cell(), campaign, config);
-  for (Finding& finding : iq::audit(bench.motor().parameters(), motor_intention(campaign, config)))
-    found.push_back({Source::motor, std::move(finding)});
+  const iq::AuditRecord& module = bench.motor().parameters();
+  for (Finding& finding : bench.motor().findings()) found.push_back({Source::motor, std::move(finding)});
+  if (!module.values.empty())
+    for (Finding& finding : iq::audit(module, motor_intention(campaign, config)))
+      found.push_back({Source::motor, std::move(finding)});
   refuse_faults(found, config);
   return found;
 }

@@ -78,7 +78,9 @@ class [[nodiscard]] OutputEnable {
   SupplyLink& supply_;
 };
 
-/// The motor. Turn it only through MotorEnable (guard/guard.hpp), whose destructor coasts it.
+/// The motor. Turn it only through MotorEnable (guard/guard.hpp), whose destructor coasts it. A driver coasts by itself
+/// once neither spin_at() nor renew() was called for its lease (kMotorLease), and so does the device once its driver is
+/// silent.
 class MotorLink {
  public:
   virtual ~MotorLink() = default;
@@ -96,10 +98,15 @@ class MotorLink {
   virtual void begin_stop(const iq::StopSettings& settings) = 0;
   /// How the last stop ended; nullopt while it is under way or before the first.
   [[nodiscard]] virtual std::optional<iq::StopReport> stop_report() = 0;
-  /// The module's parameters as read when the link was made.
-  [[nodiscard]] virtual const iq::AuditRecord& parameters() const = 0;
+  /// The parameters of an IQ module as read when the link was made; without a value: another kind of motor.
+  [[nodiscard]] virtual const iq::AuditRecord& parameters() const {
+    static const iq::AuditRecord kNone;
+    return kNone;
+  }
+  /// Findings of connecting; faults throw instead.
+  [[nodiscard]] virtual std::vector<Finding> findings() const { return {}; }
   /// Reads it now; nullopt if the module reports none. Throws DeviceError. The runner's thread.
-  [[nodiscard]] virtual std::optional<Celsius> coil_temperature() = 0;
+  [[nodiscard]] virtual std::optional<Celsius> coil_temperature() { return std::nullopt; }
   /// Takes the readings since the last call. The guard's thread.
   virtual std::size_t take(std::span<MotorReading> out) = 0;
   /// Events of the module and its line since the last call, oldest first. The guard's thread.
@@ -116,21 +123,25 @@ class MotorLink {
 class LoadCellLink {
  public:
   virtual ~LoadCellLink() = default;
-  /// As last read: when the link was made, or at start().
-  [[nodiscard]] virtual const netbox::Configuration& configuration() const = 0;
+  /// As last read: when the link was made, or at start(). An axis that the cell does not have has range 0 and counts 0.
+  [[nodiscard]] virtual results::LoadCellScale scale() const = 0;
+  /// The Net Box behind it, as last read, likewise; nullptr: another kind of load cell.
+  [[nodiscard]] virtual const netbox::Configuration* box() const { return nullptr; }
+  /// Samples that arrive at once.
+  [[nodiscard]] int records_together() const { return box() != nullptr ? box()->records_per_datagram : 1; }
   /// Findings of connecting, worst first; faults throw instead.
-  [[nodiscard]] virtual std::vector<Finding> findings() const = 0;
-  /// Reads the box's configuration and starts the stream. Throws DeviceError.
+  [[nodiscard]] virtual std::vector<Finding> findings() const { return {}; }
+  /// Reads the configuration and starts the stream. Throws DeviceError.
   virtual results::LoadCellScale start() = 0;
   virtual void stop() noexcept = 0;
   /// Takes the samples since the last call. The guard's thread.
   virtual std::size_t take(std::span<LoadCellRecord> out) = 0;
   /// Events of the stream since the last call, oldest first. The guard's thread.
   [[nodiscard]] virtual std::vector<StreamEvent> take_events() = 0;
-  /// The box's present netftapi2.xml. The runner's thread. Throws DeviceError.
-  [[nodiscard]] virtual std::string page() = 0;
-  /// Sets the box's bias: its present load becomes zero; the stream continues. The runner's thread.
-  virtual void set_bias() noexcept = 0;
+  /// The box's present netftapi2.xml. The runner's thread. Throws DeviceError. Only of a Net Box.
+  [[nodiscard]] virtual std::string page() { return {}; }
+  /// Sets the box's bias: its present load becomes zero; the stream continues. The runner's thread. Only of a Net Box.
+  virtual void set_bias() noexcept {}
   /// Why the stream failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
   [[nodiscard]] virtual SampleAccount account() const = 0;

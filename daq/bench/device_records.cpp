@@ -26,6 +26,14 @@ results::LoadCellScale to_scale(const netbox::Configuration& configuration) {
   return scale;
 }
 
+netbox::CellScale to_cell(const results::LoadCellScale& scale) noexcept {
+  netbox::CellScale cell;
+  cell.range = scale.range;
+  for (std::size_t axis = 0; axis < 6; ++axis)
+    cell.counts_per_unit[axis] = axis < 3 ? scale.counts_per_newton : scale.counts_per_newton_metre;
+  return cell;
+}
+
 StreamEvent event_at(Instant at, EventKind kind, const std::string& what, std::uint64_t records) {
   return {kind, at.count(), records, fmt::format("{:.3f} s: {}", to_seconds(at), what)};
 }

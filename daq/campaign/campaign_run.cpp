@@ -229,7 +229,7 @@ class CampaignRun {
       if (found.finding.severity != Severity::note) progress_.say(found.line());
       note(found.device == Source::motor ? "motor_finding" : "load_cell_finding", found.finding);
     }
-    if (!config_.iq.clock_gain) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
+    if (!config_.iq.clock_gain && !config_.motor) note("clock_unchecked", {{"uid", bench_.motor().parameters().uid()}});
   }
 
   /// For as long as the handle lives; a refusal is reported once.

@@ -43,9 +43,9 @@ json identity_of(const profiles::Campaign& campaign, const profiles::BenchConfig
 
 void add_devices(json& identity, Bench& bench) {
   identity["motor"] = bench.motor().identity();
-  const netbox::Configuration& box = bench.load_cell().configuration();
-  identity["load_cell"] = fmt::format("calibration {}, {:g} counts/N, {:g} counts/(N m)", box.calibration_serial,
-                                      box.counts_per_newton, box.counts_per_newton_metre);
+  const results::LoadCellScale cell = bench.load_cell().scale();
+  identity["load_cell"] = fmt::format("calibration {}, {:g} counts/N, {:g} counts/(N m)", cell.serial,
+                                      cell.counts_per_newton, cell.counts_per_newton_metre);
   if (bench.supply() != nullptr) identity["supply"] = bench.supply()->identity();
 }
 

@@ -81,9 +81,7 @@ void offer_own(Table& table, const profiles::BenchConfig& config) {
 
 }  // namespace
 
-DeviceLimits device_limits(Bench& bench) {
-  return {bench.load_cell().configuration().range, bench.motor().parameters()};
-}
+DeviceLimits device_limits(Bench& bench) { return {bench.load_cell().scale().range, bench.motor().parameters()}; }
 
 DeviceLimits device_limits(const results::RunHeader& header) {
   return {header.load_cell.range, iq::AuditRecord::of(header.motor_parameters)};

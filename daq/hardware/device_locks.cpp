@@ -98,8 +98,10 @@ std::filesystem::path lock_file(const std::string& name) {
 
 std::vector<std::string> lock_names(const profiles::BenchConfig& config) {
   if (config.simulation && config.simulation->in_process) return {};
-  std::vector<std::string> names{fmt::format("Net Box {}:{}", address_of(config.netbox.host), config.netbox.rdt_port),
-                                 "port " + real_port(config.iq.device)};
+  std::vector<std::string> names{
+      config.load_cell ? "port " + real_port(config.load_cell->device)
+                       : fmt::format("Net Box {}:{}", address_of(config.netbox.host), config.netbox.rdt_port),
+      "port " + real_port(config.iq.device)};
   if (config.supply) names.push_back(supply_name(config.supply->uri));
   return names;
 }

@@ -14,6 +14,7 @@
 #include "base/thread.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/box.hpp"
+#include "daq/bench/offered_drivers.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/realtime_kit.hpp"
@@ -81,9 +82,12 @@ std::vector<LastWord> last_words(const profiles::BenchConfig& config, const Live
   const auto stop = netbox::encode_request(netbox::Command::stop);
   const profiles::NetBoxConfig& box = config.netbox;
   const std::vector<std::string> names = lock_names(config);  // box, motor, supply
-  std::vector<LastWord> words{{"stream of the Net Box " + box.host, LastWord::Wire::udp, box.host, box.rdt_port,
-                               std::string(stop.begin(), stop.end())}};
-  words.front().lock = lock_file(names.front());
+  std::vector<LastWord> words;
+  if (!config.load_cell) {
+    words.push_back({"stream of the Net Box " + box.host, LastWord::Wire::udp, box.host, box.rdt_port,
+                     std::string(stop.begin(), stop.end())});
+    words.back().lock = lock_file(names.front());
+  }
   if (supply == nullptr || !supply->off()) return words;
   words.push_back(*supply->off());
   words.back().lock = lock_file(names.back());
@@ -208,7 +212,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
       // Checks that the box answers before anybody mounts anything.
       cell_(std::make_unique<netbox::LoadCell>(rdt_address(config_), clock_)),
       findings_(settings_.notes()) {
-  if (auto finding = netbox::cross_check(config_.host, config_.tcp_port, configuration(), kCalinfoTimeout)) {
+  if (auto finding = netbox::cross_check(config_.host, config_.tcp_port, cell_->configuration(), kCalinfoTimeout)) {
     if (finding->severity == Severity::fault)
       throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
@@ -249,11 +253,12 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
     : config_(config),
       clock_(make_prompt(SteadyClock(config.simulation ? config.simulation->time_scale : 1.0))),
       air_(config.ambient, clock_),
-      load_cell_(config.netbox, clock_, stop_asked),
+      load_cell_(config.load_cell ? connect_load_cell(config, clock_)
+                                  : std::make_unique<LiveLoadCell>(config.netbox, clock_, stop_asked)),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
       sentinel_(last_words(config, supply_.get())),
       power_(supply_to_switch_on(stop_asked)),
-      motor_(config.iq, clock_) {}
+      motor_(config.motor ? connect_motor(config, clock_) : std::make_unique<LiveMotor>(config.iq, clock_)) {}
 
 SupplyLink* LiveBench::supply_to_switch_on(const std::function<bool()>& stop_asked) {
   require_no_stop(stop_asked);
@@ -288,9 +293,7 @@ void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {
   tell_simulation(fmt::format("mount {} {:g}", propeller_id, occlusion_deg));
 }
 
-void LiveBench::hung(int axis, double newtons) {
-  tell_simulation(fmt::format("hang {} {}", "xyz"[axis], newtons));
-}
+void LiveBench::hung(int axis, double newtons) { tell_simulation(fmt::format("hang {} {}", "xyz"[axis], newtons)); }
 
 void LiveBench::tell_simulation(const std::string& line) {
   if (!config_.simulation || config_.simulation->control.empty()) return;

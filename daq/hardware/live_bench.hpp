@@ -58,7 +58,8 @@ class LiveLoadCell final : public LoadCellLink {
   /// pages of all slots. The destructor, or the next program, restores the box's settings. `stop_asked` is checked
   /// before each page. Throws DeviceError, Interrupted.
   LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked);
-  [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_->configuration(); }
+  [[nodiscard]] results::LoadCellScale scale() const override { return to_scale(cell_->configuration()); }
+  [[nodiscard]] const netbox::Configuration* box() const override { return &cell_->configuration(); }
   [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override { cell_->stop(); }
@@ -85,8 +86,8 @@ class LiveBench final : public Bench {
   /// Interrupted.
   LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked);
   [[nodiscard]] const Clock& clock() const override { return clock_; }
-  [[nodiscard]] MotorLink& motor() override { return motor_; }
-  [[nodiscard]] LoadCellLink& load_cell() override { return load_cell_; }
+  [[nodiscard]] MotorLink& motor() override { return *motor_; }
+  [[nodiscard]] LoadCellLink& load_cell() override { return *load_cell_; }
   [[nodiscard]] SupplyLink* supply() override { return supply_.get(); }
   [[nodiscard]] std::optional<ambient::Density> air() const override { return air_.density(); }
   void wait_until(Instant when) override;
@@ -95,8 +96,8 @@ class LiveBench final : public Bench {
   [[nodiscard]] Duration sync_interval() const override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   void hung(int axis, double newtons) override;
-  [[nodiscard]] bool switch_off_power() override { return power_.off(motor_); }
-  void restore_power() override { power_.restore(motor_, clock_); }
+  [[nodiscard]] bool switch_off_power() override { return power_.off(*motor_); }
+  void restore_power() override { power_.restore(*motor_, clock_); }
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
   [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string& why_not) override;
 
@@ -109,11 +110,11 @@ class LiveBench final : public Bench {
   profiles::BenchConfig config_;
   SteadyClock clock_;
   AirSource air_;
-  LiveLoadCell load_cell_;
+  std::unique_ptr<LoadCellLink> load_cell_;
   std::unique_ptr<LiveSupply> supply_;
   Sentinel sentinel_;  ///< from before anything has power until nothing has
   MotorPower power_;   ///< made before the motor, which needs it to answer; destroyed after it
-  LiveMotor motor_;
+  std::unique_ptr<MotorLink> motor_;
 };
 
 }  // namespace kphi::daq

@@ -18,7 +18,7 @@ Recorder::Recorder(Bench& bench, Guard& guard, results::RunWriter& writer)
     : bench_(bench),
       guard_(guard),
       writer_(writer),
-      scale_(bench.load_cell().configuration()),
+      scale_(to_cell(bench.load_cell().scale())),
       range_(scale_),
       next_sync_(bench.clock().now() + bench.sync_interval()),
       records_(kRecordsAtOnce),

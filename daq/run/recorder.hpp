@@ -43,7 +43,7 @@ class Recorder {
   Bench& bench_;
   Guard& guard_;
   results::RunWriter& writer_;
-  const netbox::Configuration scale_;
+  const netbox::CellScale scale_;
   netbox::RangeWatch range_;
   netbox::RangeVerdict worst_ = netbox::RangeVerdict::inside;
   bool measuring_ = false;

@@ -65,9 +65,10 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
 using Streaming = std::unique_ptr<LoadCellLink, decltype([](LoadCellLink* cell) { cell->stop(); })>;
 
 /// Checks a box whose settings changed since they were last read against the campaign. Throws ConfigurationError.
-void judge_changes(const netbox::Configuration& before, const LoadCellLink& cell, const RunOrder& order,
+void judge_changes(const std::optional<netbox::Configuration>& before, const LoadCellLink& cell, const RunOrder& order,
                    Progress& progress) {
-  const netbox::Changes changes = changes_since(before, cell.configuration(), order.campaign.box_bias);
+  if (!before) return;
+  const netbox::Changes changes = changes_since(*before, *cell.box(), order.campaign.box_bias);
   if (changes == 0) return;
   progress.say("load cell: configuration changed since it was last read: " + netbox::to_words(changes) +
                "; recording this run with the present scale");
@@ -181,7 +182,8 @@ std::string utc_text(const Clock& clock, Instant when) {
 }
 
 RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, const std::function<bool()>& stop_asked) {
-  const netbox::Configuration before = bench.load_cell().configuration();
+  std::optional<netbox::Configuration> before;
+  if (const auto* box = bench.load_cell().box()) before = *box;
   const results::MotorCounts counts_before = bench.motor().counts();
   const results::LoadCellScale scale = bench.load_cell().start();
   Streaming streaming(&bench.load_cell());

@@ -111,9 +111,11 @@ void Sequence::switch_off(StopWords& words) {
 }
 
 void Sequence::compare_configuration(int attempts) {
+  const netbox::Configuration* box = bench_.load_cell().box();
+  if (box == nullptr) return;
   const auto event = configuration_event(
-      bench_.load_cell().configuration(), box_bias_.records > 0, [&] { return bench_.load_cell().page(); },
-      [&] { return bench_.clock().now(); }, attempts);
+      *box, box_bias_.records > 0, [&] { return bench_.load_cell().page(); }, [&] { return bench_.clock().now(); },
+      attempts);
   if (!event) return;
   recorder_.note(*event);
   progress_.say("load cell: " + event->text);
@@ -150,8 +152,9 @@ void Sequence::take_box_bias() {
 void Sequence::set_box_bias() {
   mark(Phase::bias_settling);
   bench_.load_cell().set_bias();
-  const netbox::Configuration& box = bench_.load_cell().configuration();
-  hold(bench_.clock().stretched(kBiasWorksWall) + from_seconds(3 * box.records_per_datagram / box.rdt_rate_hz));
+  LoadCellLink& cell = bench_.load_cell();
+  hold(bench_.clock().stretched(kBiasWorksWall) +
+       from_seconds(3 * cell.records_together() / cell.scale().sample_rate_hz));
 }
 
 void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {

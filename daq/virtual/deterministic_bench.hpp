@@ -77,7 +77,8 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void outlive(Instant when);
 
  private:
-  [[nodiscard]] const netbox::Configuration& configuration() const override { return configuration_; }
+  [[nodiscard]] results::LoadCellScale scale() const override { return to_scale(configuration_); }
+  [[nodiscard]] const netbox::Configuration* box() const override { return &configuration_; }
   [[nodiscard]] std::vector<Finding> findings() const override { return findings_; }
   results::LoadCellScale start() override;
   void stop() noexcept override;

@@ -47,7 +47,8 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   void stop() noexcept override { cell_.stop(); }
 
  private:
-  [[nodiscard]] const netbox::Configuration& configuration() const override { return cell_.configuration(); }
+  [[nodiscard]] results::LoadCellScale scale() const override { return daq::to_scale(cell_.configuration()); }
+  [[nodiscard]] const netbox::Configuration* box() const override { return &cell_.configuration(); }
   [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
   std::size_t take(std::span<LoadCellRecord> out) override { return cell_.take(out); }
   [[nodiscard]] std::vector<StreamEvent> take_events() override { return {}; }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daq/bench/bench.hpp"
+#include "daq/bench/device_records.hpp"
 
 namespace kphi::daq {
 
@@ -89,9 +90,9 @@ inline LoadCellRecord load_of(double fz_n, double tz_nm = 0) {
 class QueueBench : public Bench, private LoadCellLink {
  public:
   QueueBench() {
-    box.counts_per_newton = mini40().counts_per_newton;
-    box.counts_per_newton_metre = mini40().counts_per_newton_metre;
-    box.range = mini40().range;
+    configuration.counts_per_newton = mini40().counts_per_newton;
+    configuration.counts_per_newton_metre = mini40().counts_per_newton_metre;
+    configuration.range = mini40().range;
   }
   [[nodiscard]] const Clock& clock() const override { return time; }
   [[nodiscard]] MotorLink& motor() override { return queue_motor; }
@@ -115,10 +116,11 @@ class QueueBench : public Bench, private LoadCellLink {
   SupplyLink* supply_link = nullptr;
   std::deque<MotorReading>& readings = queue_motor.readings;
   std::vector<StreamEvent> events;
-  netbox::Configuration box;
+  netbox::Configuration configuration;
 
  private:
-  [[nodiscard]] const netbox::Configuration& configuration() const override { return box; }
+  [[nodiscard]] results::LoadCellScale scale() const override { return to_scale(configuration); }
+  [[nodiscard]] const netbox::Configuration* box() const override { return &configuration; }
   [[nodiscard]] std::vector<Finding> findings() const override { return {}; }
   results::LoadCellScale start() override { return {}; }
   void stop() noexcept override {}

@@ -78,7 +78,11 @@ inline const std::vector<Room>& rooms() {
       {"fit/logs", {"base", "compensation", "results", "fit"}},
       {"fit/export", {"base", "compensation", "results", "fit"}},
 
-      {"commands", {"base", "compensation", "profiles", "drivers", "results", "daq", "fit"}},
+      // Drivers that are not kphi's own: what anybody's would see.
+      {"examples/second_bench",
+       {"base", "compensation/units.hpp", "profiles/bench_config.hpp", "drivers", "results/records.hpp", "daq/bench"}},
+
+      {"commands", {"base", "compensation", "profiles", "drivers", "results", "daq", "fit", "examples"}},
   };
   return kRooms;
 }

@@ -121,6 +121,40 @@ TEST(BenchConfig, EachMistakeEarnsItsRefusal) {
         "the value in RPM"}});
 }
 
+TEST(BenchConfig, NamesDevicesOfOtherDriversInsteadOfNetBoxAndModule) {
+  const std::string text =
+      "format: kphi-bench/1\nname: other\n"
+      "load_cell: {driver: hx711, device: /dev/ttyACM0, baud: 57600, rate_hz: 80, settings: {counts_per_newton: 2e4}}\n"
+      "motor: {driver: esc, device: /dev/ttyACM1, spin: -1, speed_max_rpm: 9000, settings: {pole_pairs: 7}}\n"
+      "thrust_axis: \"-Fx\"\n";
+  const BenchConfig bench = parse_bench(text, "b.yaml");
+  ASSERT_TRUE(bench.load_cell && bench.motor);
+  EXPECT_EQ(load_cell_words(bench), "hx711 /dev/ttyACM0");
+  EXPECT_EQ(motor_words(bench), "esc /dev/ttyACM1");
+  EXPECT_EQ(bench.load_cell->baud, 57600u);
+  EXPECT_EQ(bench.load_cell->settings.at("counts_per_newton"), 2e4);
+  EXPECT_EQ(bench.netbox.rate_hz, 80);
+  EXPECT_EQ(bench.netbox.records_per_datagram, 1);
+  EXPECT_EQ(bench.iq.device, "/dev/ttyACM1");
+  EXPECT_EQ(bench.iq.spin, -1);
+  EXPECT_NEAR(to_rpm(bench.iq.speed_max), 9000, 1e-6);
+  const auto refused_with = [&](const std::string& more, const std::string& without = "") {
+    std::string changed = text;
+    if (!without.empty())
+      changed.erase(changed.find(without), changed.find('\n', changed.find(without)) + 1 - changed.find(without));
+    try {
+      (void)parse_bench(changed + more, "b.yaml");
+      return std::string();
+    } catch (const std::exception& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_THAT(refused_with("netbox: {host: 192.168.1.1}\n"), testing::HasSubstr("netbox and load_cell are both given"));
+  EXPECT_THAT(refused_with("", "load_cell"), testing::HasSubstr("netbox and load_cell are missing"));
+  EXPECT_THAT(refused_with("", "motor"), testing::HasSubstr("iq and motor are missing; write one of them"));
+  EXPECT_THAT(refused_with("simulation: {in_process: true}\n"), testing::HasSubstr("has a Net Box and an IQ module"));
+}
+
 TEST(BenchConfig, KnowsWhereTheBoxSpeaksTcp) {
   EXPECT_EQ(parse_bench(kBenchText, "b.yaml").netbox.tcp_port, 49999) << "one below the port of RDT";
   EXPECT_EQ(parse_bench(changed(kBenchText, "  rate_hz", "  tcp_port: 50017\n  rate_hz"), "b.yaml").netbox.tcp_port,

@@ -18,12 +18,22 @@ struct ZeroMeasurement {
   std::uint64_t records = 0;                   ///< without the saturated and faulty ones
 };
 
+/// What load a count is, and where the load ends.
+struct CellScale {
+  std::array<double, 6> counts_per_unit{};  ///< per N and N m
+  std::array<double, 6> range{};            ///< N and N m
+  CellScale() = default;
+  CellScale(const Configuration& box) noexcept : range(box.range) {  // a box's is one
+    for (std::size_t axis = 0; axis < 6; ++axis) counts_per_unit[axis] = box.counts_per_unit(axis);
+  }
+};
+
 /// Mean and standard deviation (n - 1) of what the cell shows without load, as the records come.
 class ZeroEstimate {
  public:
   /// Leaves an unhealthy record out.
   void add(const Counts& counts, std::uint32_t status) noexcept;
-  [[nodiscard]] ZeroMeasurement result(const Configuration& scale) const noexcept;
+  [[nodiscard]] ZeroMeasurement result(const CellScale& scale) const noexcept;
 
  private:
   std::array<double, 6> mean_{}, squares_{};  // counts
@@ -42,10 +52,10 @@ enum class RangeVerdict : std::uint8_t {
   beyond,  ///< at 100 % or more: the sample is to be flagged
 };
 
-/// Compares each sample with the sensing ranges (cfgmr).
+/// Compares each sample with the sensing ranges (cfgmr); an axis of range 0 is not judged.
 class RangeWatch {
  public:
-  explicit RangeWatch(const Configuration& configuration) noexcept;
+  explicit RangeWatch(const CellScale& scale) noexcept;
 
   /// The worst of the six axes.
   RangeVerdict look(const Counts& counts) noexcept;
