@@ -111,6 +111,7 @@ Json to_json(const iq::ClockGain& gain) {
 iq::ProbeSettings probe_settings(const profiles::MotorConfig& config, std::optional<double> clock_gain_s) {
   iq::ProbeSettings settings;
   settings.intention.speed_max_rad_s = config.speed_max.value();
+  settings.intention.accepted_without = config.accept_without;
   settings.intention.clock_unchecked = !config.clock_gain && !clock_gain_s;
   if (config.clock_gain && !clock_gain_s) settings.intention.uid = config.clock_gain->uid;
   if (clock_gain_s) {

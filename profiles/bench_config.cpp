@@ -53,6 +53,8 @@ MotorConfig read_module(const ProfileReader& file, const std::filesystem::path& 
   config.telemetry_hz = file.get_or("/iq/telemetry_hz", config.telemetry_hz);
   config.speed_max = from_rpm(file.number("/iq/speed_max_rpm"));
   if (file.has("/iq/clock_gain")) config.clock_gain = read_clock_gain(file);
+  for (std::size_t i = 0; file.has(fmt::format("/iq/accept_without/{}", i)); ++i)
+    config.accept_without.push_back(file.text(fmt::format("/iq/accept_without/{}", i)));
   if (file.has("/iq/capture")) config.capture = (folder / file.text("/iq/capture")).string();
   return config;
 }
@@ -115,14 +117,23 @@ SupplyConfig read_supply(ProfileReader& file) {
   return config;
 }
 
-AmbientConfig read_ambient(const ProfileReader& file) {
-  if (!file.has("/ambient/manual")) {
+AmbientConfig read_ambient(ProfileReader& file) {
+  if (file.has("/ambient/manual") && file.has("/ambient/sensor"))
+    file.refuse("/ambient/sensor", "manual values are given, too", "write one of them");
+  if (file.has("/ambient/sensor"))
+    return {file.text("/ambient/sensor"), file.find<double>("/ambient/u_temperature_c"), std::nullopt};
+  if (file.is_text("/ambient")) {
     const std::string sensor = file.text("/ambient");
-    return {sensor == "unknown" ? "" : sensor, std::nullopt};
+    return {sensor == "unknown" ? "" : sensor, std::nullopt, std::nullopt};
+  }
+  if (!file.has("/ambient/manual")) {
+    file.refuse("/ambient", "neither sensor nor manual is given", "write one of them");
+    return {};
   }
   const auto value = [&](const char* key) { return file.number(std::string("/ambient/manual/") + key); };
-  return {"", ManualAir{value("temperature_c"), value("pressure_pa"), value("relative_humidity"),
-                        value("u_temperature_c"), value("u_pressure_pa"), value("u_relative_humidity")}};
+  return {"", std::nullopt,
+          ManualAir{value("temperature_c"), value("pressure_pa"), value("relative_humidity"), value("u_temperature_c"),
+                    value("u_pressure_pa"), value("u_relative_humidity")}};
 }
 
 SimulatedStand read_stand(const ProfileReader& file) {

@@ -46,6 +46,7 @@ struct MotorConfig {
   double telemetry_hz = 50;  ///< speed readings per second of bench time; other quantities take turns
   RadPerSec speed_max;       ///< highest speed that may be commanded
   std::optional<ClockGain> clock_gain;
+  std::vector<std::string> accept_without;  ///< what its firmware may lack: power_safety, volts_limit
   std::string capture;  ///< path of a file for all bytes of the line, beside the bench file; empty: none
 };
 
@@ -100,6 +101,9 @@ struct ManualAir {
 /// Where the state of the air comes from; unknown without either.
 struct AmbientConfig {
   std::string sensor;  ///< "usb:04d8:00dd", with :SERIAL or @PORT; empty: none
+  /// Standard uncertainty of its temperature where it hangs, °C; nullopt: that of its data sheet. Less than that does
+  /// not count.
+  std::optional<double> u_temperature_c{};
   std::optional<ManualAir> manual;
   [[nodiscard]] bool known() const noexcept { return !sensor.empty() || manual.has_value(); }
 };

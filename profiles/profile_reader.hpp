@@ -33,6 +33,7 @@ class ProfileReader {
   [[nodiscard]] T get_or(const std::string& pointer, T otherwise) const {
     return find<T>(pointer).value_or(otherwise);
   }
+  [[nodiscard]] bool is_text(const std::string& pointer) const { return value(pointer).is_string(); }
   /// The keys of an object.
   [[nodiscard]] std::vector<std::string> keys(const std::string& pointer) const;
 

@@ -39,6 +39,7 @@ iq::Intention motor_intention(const profiles::Campaign& campaign, const profiles
     intention.speed_max_rad_s = std::max(intention.speed_max_rad_s, level.value());
   intention.coil_temperature_max_degc = limit_of_files(Watched::coil_temperature, campaign, config);
   if (config.iq.clock_gain) intention.uid = config.iq.clock_gain->uid;
+  intention.accepted_without = config.iq.accept_without;
   return intention;
 }
 

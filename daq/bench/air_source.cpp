@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.hpp"
 #include "drivers/ambient/bme280.hpp"
 
@@ -13,7 +15,7 @@ constexpr std::chrono::minutes kOldest{1};         // likewise; weather is slowe
 
 }  // namespace
 
-AirSource::AirSource(const profiles::AmbientConfig& config, const Clock& clock) : clock_(clock) {
+AirSource::AirSource(const profiles::AmbientConfig& config, const Clock& clock) : clock_(clock), config_(config) {
   if (const auto& seen = config.manual) {
     manual_ = configured("ambient", [&] {
       return ambient::density_of({seen->temperature_c, seen->pressure_pa, seen->relative_humidity,
@@ -31,7 +33,12 @@ std::optional<ambient::Density> AirSource::density() const {
   if (!sensor_) return manual_;
   const auto newest = sensor_->newest();
   if (!newest || clock_.shrunk(newest->age) > kOldest) return std::nullopt;
-  return ambient::density_of(newest->air);
+  return ambient::density_of(as_placed(newest->air, config_));
+}
+
+ambient::Air as_placed(ambient::Air air, const profiles::AmbientConfig& config) {
+  air.u_temperature_c = std::max(air.u_temperature_c, config.u_temperature_c.value_or(0));
+  return air;
 }
 
 std::string words_of(const ambient::Density& air) {

@@ -21,9 +21,13 @@ class AirSource {
 
  private:
   const Clock& clock_;
+  const profiles::AmbientConfig config_;
   std::optional<ambient::Density> manual_;
   std::optional<ambient::AmbientWorker> sensor_;
 };
+
+/// As a sensor measured it, less certain where the bench file says so.
+[[nodiscard]] ambient::Air as_placed(ambient::Air air, const profiles::AmbientConfig& config);
 
 /// "air 1.2041 ± 0.0012 kg/m³".
 [[nodiscard]] std::string words_of(const ambient::Density& air);

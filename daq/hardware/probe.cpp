@@ -109,7 +109,13 @@ DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock
 }
 
 DeviceAnswer ask_sensor(const std::string& address) {
-  return answer_of("ambient " + address, [&] { return air_of(address); });
+  DeviceAnswer answer = answer_of("ambient " + address, [&] { return air_of(address); });
+  if (answer.answers)
+    answer.lines.push_back(
+        "note: it must hang in the air that the propeller draws: a warm board beside it adds 3 to 7 °C, 1 to 2 % of k "
+        "in "
+        "standard air; say how far it is to be trusted with ambient: {sensor: …, u_temperature_c: …}");
+  return answer;
 }
 
 std::vector<DeviceAnswer> ask_usb(const std::vector<DeviceAnswer>& known) {

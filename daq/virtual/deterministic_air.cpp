@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/error.hpp"
+#include "daq/bench/air_source.hpp"
 #include "drivers/ambient/ambient_worker.hpp"
 #include "drivers/ambient/bme280.hpp"
 
@@ -95,8 +96,10 @@ class DeterministicAir::Sensor {
   ambient::Bme280Sensor sensor_;
 };
 
-DeterministicAir::DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults)
+DeterministicAir::DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults,
+                                   const profiles::AmbientConfig& config)
     : bench_(bench),
+      config_(config),
       time_(bench.now()),
       faults_(time_, std::move(faults)),
       bridge_(faults_, "0001", sim::Bme280(air)),
@@ -119,7 +122,7 @@ void DeterministicAir::look() {
 void DeterministicAir::measure() {
   try {
     if (!sensor_) sensor_ = std::make_unique<Sensor>(bridge_, faults_, time_);
-    newest_ = ambient::density_of(sensor_->read());
+    newest_ = ambient::density_of(as_placed(sensor_->read(), config_));
     newest_at_ = time_.now();
     pause_ = kRhythm.first_pause;
     next_ = time_.now() + kRhythm.between_readings;

@@ -9,6 +9,7 @@
 #include "drivers/ambient/air.hpp"
 #include "drivers/sim/usb/function.hpp"
 #include "drivers/sim/usb/mcp2221.hpp"
+#include "profiles/bench_config.hpp"
 
 namespace kphi::daq {
 
@@ -16,7 +17,8 @@ class DeterministicAir {
  public:
   /// Waits for the first reading, in its own time: on a live bench another thread does. Throws DeviceError without a
   /// reading. `bench` outlives this.
-  DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults);
+  DeterministicAir(const Clock& bench, const sim::TrueAir& air, sim::FaultScript faults,
+                   const profiles::AmbientConfig& config = {});
   ~DeterministicAir();
 
   /// Call it whenever time has passed. Measures every five seconds; after a failure it opens the sensor again, after
@@ -30,6 +32,7 @@ class DeterministicAir {
   void measure();
 
   const Clock& bench_;
+  const profiles::AmbientConfig config_;
   ManualClock time_;  ///< of the sensor's thread, which may be ahead of the bench while it waits
   sim::UsbFaults faults_;
   sim::Mcp2221 bridge_;

@@ -74,7 +74,10 @@ sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::B
 
 DeterministicBench::DeterministicBench(const profiles::BenchConfig& config, const sim::BenchSettings& other,
                                        Lives lives)
-    : config_(config), other_(other), lives_(lives), air_({.sensor = "", .manual = config.ambient.manual}, clock_) {
+    : config_(config),
+      other_(other),
+      lives_(lives),
+      air_({.sensor = "", .u_temperature_c = {}, .manual = config.ambient.manual}, clock_) {
   if (config.simulation && config.simulation->durable) files_ = &results::disk();
   make_devices(simulated_devices(config_, other_));
 }
@@ -95,7 +98,7 @@ void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
     clock_.set(clock_.now() + kSupplyRises);
     sim_->advance(clock_.now());
   }
-  if (!config_.ambient.sensor.empty()) measured_air_.emplace(clock_, settings.air, settings.faults);
+  if (!config_.ambient.sensor.empty()) measured_air_.emplace(clock_, settings.air, settings.faults, config_.ambient);
   motor_->connect();
   read_box();
   cross_check();

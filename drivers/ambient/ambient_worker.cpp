@@ -9,48 +9,53 @@
 namespace kphi::ambient {
 
 AmbientWorker::AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm)
-    : open_(std::move(open)), clock_(clock), rhythm_(rhythm), thread_(start_thread({"air"}, [this] { run(); })) {}
+    : clock_(clock),
+      shared_(std::make_shared<Shared>(std::move(open), clock, rhythm)),
+      thread_(start_thread({"air"}, [shared = shared_] { shared->run(); })) {}
 
 AmbientWorker::~AmbientWorker() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_asked_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
+  std::unique_lock lock(shared_->mutex);
+  shared_->stop_asked = true;
+  shared_->changed.notify_all();
+  const bool ended = shared_->changed.wait_for(lock, kPatience, [&] { return shared_->ended; });
+  lock.unlock();
+  if (ended)
+    thread_.join();
+  else
+    thread_.detach();
 }
 
 std::optional<AirReading> AmbientWorker::newest() const {
-  const std::lock_guard lock(mutex_);
-  if (!newest_) return std::nullopt;
-  AirReading reading = *newest_;
+  const std::lock_guard lock(shared_->mutex);
+  if (!shared_->newest) return std::nullopt;
+  AirReading reading = *shared_->newest;
   reading.age = clock_.now() - reading.at;
   return reading;
 }
 
 std::string AmbientWorker::failure() const {
-  const std::lock_guard lock(mutex_);
-  return failure_;
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->failure;
 }
 
 bool AmbientWorker::wait_for_first(Duration wall) const {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, wall, [&] { return newest_.has_value(); });
+  std::unique_lock lock(shared_->mutex);
+  return shared_->changed.wait_for(lock, wall, [&] { return shared_->newest.has_value(); });
 }
 
-void AmbientWorker::run() noexcept {
+void AmbientWorker::Shared::run() noexcept {
   std::unique_ptr<Ambient> sensor;
-  Duration pause = rhythm_.first_pause;
+  Duration pause = rhythm.first_pause;
   Duration rest{0};
   while (!stopped_within(rest)) {
     std::optional<Air> air;
     std::string why;
     try {
-      if (!sensor) sensor = open_();
+      if (!sensor) sensor = open();
       if (!sensor) throw DeviceError("ambient", "open", "no sensor found");
       air = sensor->read();
-      rest = rhythm_.between_readings;
-      pause = rhythm_.first_pause;
+      rest = rhythm.between_readings;
+      pause = rhythm.first_pause;
     } catch (const std::exception& error) {
       why = error.what();
     } catch (...) {
@@ -58,18 +63,23 @@ void AmbientWorker::run() noexcept {
     }
     if (!air) {
       sensor.reset();
-      rest = std::exchange(pause, std::min(2 * pause, rhythm_.longest_pause));
+      rest = std::exchange(pause, std::min(2 * pause, rhythm.longest_pause));
     }
-    const std::lock_guard lock(mutex_);
-    if (air) newest_ = AirReading{*air, clock_.now(), Duration{0}};
-    failure_ = std::move(why);
-    changed_.notify_all();
+    const std::lock_guard lock(mutex);
+    if (stop_asked) break;
+    if (air) newest = AirReading{*air, clock->now(), Duration{0}};
+    failure = std::move(why);
+    changed.notify_all();
   }
+  sensor.reset();
+  const std::lock_guard lock(mutex);
+  ended = true;
+  changed.notify_all();
 }
 
-bool AmbientWorker::stopped_within(Duration wall) {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, wall, [&] { return stop_asked_; });
+bool AmbientWorker::Shared::stopped_within(Duration wall) {
+  std::unique_lock lock(mutex);
+  return changed.wait_for(lock, wall, [&] { return stop_asked; });
 }
 
 }  // namespace kphi::ambient

@@ -35,8 +35,10 @@ class AmbientWorker {
 
   /// Opens nothing yet; `clock` must outlive this.
   AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm = {});
-  /// Waits for a reading in progress: 0.2 s, or some seconds if the bridge no longer answers.
+  /// Waits for a reading in progress and until the sensor is closed, 0.2 s, but never longer than `kPatience`: a bridge
+  /// that takes eleven seconds to let go (EasyMCP2221 #7) does so without anybody.
   ~AmbientWorker();
+  static constexpr Duration kPatience = std::chrono::seconds(1);
 
   // Any thread; they do not wait.
   /// nullopt before the first reading. After a failure of the sensor it stays and ages.
@@ -47,20 +49,25 @@ class AmbientWorker {
   [[nodiscard]] bool wait_for_first(Duration wall) const;
 
  private:
-  void run() noexcept;
-  [[nodiscard]] bool stopped_within(Duration wall);
+  /// What callers and the thread share; the thread may outlive the worker.
+  struct Shared {
+    Shared(Open how, const Clock& time, const Rhythm& beat) : open(std::move(how)), clock(&time), rhythm(beat) {}
+    const Open open;
+    const Clock* clock;  ///< only while nobody has asked to stop
+    const Rhythm rhythm;
+    // Locked only while copying, never during traffic.
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool stop_asked = false, ended = false;
+    std::optional<AirReading> newest;
+    std::string failure = "not measured yet";
 
-  const Open open_;
+    void run() noexcept;
+    [[nodiscard]] bool stopped_within(Duration wall);
+  };
+
   const Clock& clock_;
-  const Rhythm rhythm_;
-
-  // Shared by callers and the thread; locked only while copying, never during traffic.
-  mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  bool stop_asked_ = false;
-  std::optional<AirReading> newest_;
-  std::string failure_ = "not measured yet";
-
+  const std::shared_ptr<Shared> shared_;
   std::thread thread_;
 };
 

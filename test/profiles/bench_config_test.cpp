@@ -114,7 +114,7 @@ TEST(BenchConfig, EachMistakeEarnsItsRefusal) {
        {"192.168.1.1", "\"http://192.168.1.1\"", "4:9: netbox.host: text \"http://192.168.1.1\" does not fit…"},
        {"192.168.1.1", "\"::1\"", ""},
        // Names the key that was meant
-       {"  baud:", "  baud_rate:", "11:3: baud_rate is not a key of iq; known here: baud,…"},
+       {"  baud:", "  baud_rate:", "11:3: baud_rate is not a key of iq; known here: accept_without, baud,…"},
        {"rdt_port", "rtd_port", "5:3: rtd_port is not a key of netbox; did you mean rdt_port?"},
        {"speed_max_rpm", "speed_max_rad_s",
         "15:3: speed_max_rad_s is not a key of iq; the unit is part of the key: write speed_max_rpm and "
@@ -153,6 +153,14 @@ TEST(BenchConfig, NamesDevicesOfOtherDriversInsteadOfNetBoxAndModule) {
   EXPECT_THAT(refused_with("", "load_cell"), testing::HasSubstr("netbox and load_cell are missing"));
   EXPECT_THAT(refused_with("", "motor"), testing::HasSubstr("iq and motor are missing; write one of them"));
   EXPECT_THAT(refused_with("simulation: {in_process: true}\n"), testing::HasSubstr("has a Net Box and an IQ module"));
+}
+
+TEST(BenchConfig, AcceptsByNameWhatAFirmwareMayLack) {
+  std::string text = kBenchText;
+  text.insert(text.find("  module_id: 7"), "  accept_without: [power_safety]\n");
+  EXPECT_THAT(parse_bench(text, "b.yaml").iq.accept_without, testing::ElementsAre("power_safety"));
+  text.replace(text.find("[power_safety]"), 14, "[timeout]");
+  EXPECT_THROW((void)parse_bench(text, "b.yaml"), RefusedFile);
 }
 
 TEST(BenchConfig, KnowsWhereTheBoxSpeaksTcp) {
@@ -245,6 +253,12 @@ TEST(BenchConfig, KnowsWhereTheStateOfTheAirComesFrom) {
   EXPECT_FALSE(config("ambient: unknown\n").known());
   for (const char* sensor : {"usb:04d8:00dd", "usb:04D8:00DD:0001AB", "usb:04d8:00dd@1-1.4", "usb:04d8:00dd:A1@2-3"})
     EXPECT_EQ(config(std::string("ambient: ") + sensor + "\n").sensor, sensor);
+  const AmbientConfig placed = config("ambient: {sensor: \"usb:04d8:00dd\", u_temperature_c: 1.5}\n");
+  EXPECT_EQ(placed.sensor, "usb:04d8:00dd");
+  EXPECT_EQ(placed.u_temperature_c, 1.5);
+  EXPECT_TRUE(placed.known());
+  EXPECT_THROW((void)config("ambient: {u_temperature_c: 1.5}\n"), RefusedFile);
+  EXPECT_THROW((void)config("ambient: {}\n"), RefusedFile);
   const AmbientConfig by_hand = config(kManualAir);
   EXPECT_TRUE(by_hand.known());
   EXPECT_EQ(by_hand.sensor, "");
@@ -260,7 +274,7 @@ TEST(BenchConfig, KnowsWhereTheStateOfTheAirComesFrom) {
 TEST(BenchConfig, RefusesAirFromNowhere) {
   const std::string advice =
       "write unknown, or usb:04d8:00dd (a BME280 behind an MCP2221A; :SERIAL or @PORT behind it if there are several), "
-      "or manual: and the values";
+      "or sensor: and u_temperature_c, or manual: and the values";
   EXPECT_THAT(refused_air("ambient: usb:0403:6001\n"),
               ElementsAre("21:10: ambient: text \"usb:0403:6001\" does not fit; " + advice));
   EXPECT_THAT(refused_air("ambient: 21\n"), ElementsAre("21:10: ambient: 21 does not fit; " + advice));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "compensation/units.hpp"
@@ -67,17 +68,52 @@ class Checks {
 
   void unanswered() {
     std::vector<const char*> missing;
-    const auto need = [&](const char* name, bool answered) {
-      if (!answered) missing.push_back(name);
+    const auto need = [&](const char* name, bool answered, const char* without = "", const char* consequence = "") {
+      if (answered) return;
+      if (std::ranges::find(intention_.accepted_without, without) == intention_.accepted_without.end())
+        return missing.push_back(name);
+      warn(fmt::format("no answer from the module for {}, accepted by accept_without in the bench file: {}", name,
+                       consequence),
+           "");
     };
     need("firmware_version", module_.firmware().has_value());
     need("hardware_version", module_.hardware().has_value());
-    need("volts_limit", value<"brushless_drive.volts_limit">().has_value());
+    need("volts_limit", value<"brushless_drive.volts_limit">().has_value(), kMayLack[1],
+         "a supply above it would let the motor run away to its maximum speed");
     need("timeout", value<"propeller_motor_control.timeout">().has_value());
-    need("fault_now", value<"power_safety.fault_now">().has_value());
-    if (missing.empty()) return;
-    fault(fmt::format("no answer from the module for {}", fmt::join(missing, ", ")),
-          "check module id and wiring; update its firmware if it is old");
+    need("fault_now", value<"power_safety.fault_now">().has_value(), kMayLack[0],
+         "the module tells none of its faults, and kphi's own limits are all that holds");
+    if (!missing.empty())
+      fault(
+          fmt::format("no answer from the module for {}", fmt::join(missing, ", ")),
+          "check module id and wiring; update its firmware if it is old, or accept what may be lacking (power_safety, "
+          "volts_limit) by name: iq.accept_without");
+    lacking();
+  }
+
+  /// Everything that was asked and not answered, once: a client by its name if none of its entries was.
+  void lacking() {
+    const int coil = module_.coil_temperature_client();
+    std::map<std::string, std::pair<std::vector<std::string>, bool>> clients;  // entries missing; whether one answered
+    for (const Entry& entry : kEntries) {
+      const bool other_coil =
+          (entry.type == Client::temperature_estimator || entry.type == Client::coil_temperature_estimator) &&
+          static_cast<int>(entry.type) != coil;
+      if (!entry.audited || (other_coil && coil != 0)) continue;
+      const std::string path(entry.path);
+      auto& [absent, answered] = clients[path.substr(0, path.find('.'))];
+      if (module_.values.contains(&entry))
+        answered = true;
+      else
+        absent.push_back(path);
+    }
+    std::vector<std::string> names;
+    for (const auto& [client, found] : clients) {
+      if (!found.second && !found.first.empty()) names.push_back(client);
+      if (found.second) names.insert(names.end(), found.first.begin(), found.first.end());
+    }
+    if (!names.empty() && names.size() < clients.size())
+      note(fmt::format("this firmware does not know {}: what hangs on that is not checked", fmt::join(names, ", ")));
   }
 
   void other_module() {

@@ -77,7 +77,7 @@ void IqDevice::tune() noexcept {
   limits_.amps_soft_start = memory_.finite(50, 42);
   limits_.amps_soft_end = memory_.finite(50, 43);
   limits_.volts_start = memory_.finite(50, 29);
-  limits_.volts_limit = memory_.finite(50, 35);
+  if (!settings_.quirks.no_volts_limit) limits_.volts_limit = memory_.finite(50, 35);
   limits_.redline_start = upset_.redline.value_or(memory_.finite(50, 38));
   limits_.redline_end = upset_.redline ? 1.03 * *upset_.redline : memory_.finite(50, 39);
   limits_.slew = memory_.value(50, 47) != 0 ? memory_.finite(50, 46) : 0;

@@ -197,6 +197,8 @@ std::vector<IqEntry> iq_entries() {
 }
 
 bool iq_present(const IqEntry& entry, const IqQuirks& quirks) noexcept {
+  if (quirks.no_power_safety && entry.type == 84) return false;
+  if (quirks.no_volts_limit && entry.type == 50 && entry.sub == 35) return false;
   return entry.presence == always || (entry.presence == legacy) == quirks.legacy;
 }
 

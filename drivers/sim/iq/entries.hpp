@@ -14,6 +14,8 @@ struct IqQuirks {
   bool legacy = false;  ///< before the coil estimator and the configurable timeout: client 77 instead of 83, and after
                         ///< a timeout the song plays until a spin or an arming
   bool system_control_on_id_zero = false;  ///< client 5 answers on module id 0 only
+  bool no_power_safety = false;            ///< client 84 does not exist
+  bool no_volts_limit = false;             ///< nor entry 35 of client 50
 };
 
 inline constexpr IqQuirks kLegacyFirmware{true, true};

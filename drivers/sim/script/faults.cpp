@@ -233,6 +233,8 @@ const std::vector<FaultRow>& fault_rows() {
       {K::ambient_nack, "ambient_nack", kSome, {}},
       {K::ambient_busy, "ambient_busy", kSome, {}},
       {K::ambient_stuck_bus, "ambient_stuck_bus", kSome, {}},
+      {K::ambient_slow_close, "ambient_slow_close", kSome, {any_delay}},
+      {K::ambient_warm, "ambient_warm", kWindow, {required<&F::coil>("celsius", -20, 20)}},
       {K::ambient_reads_as, "ambient_reads_as", kSome, {byte_at, byte}},
   };
   return all;

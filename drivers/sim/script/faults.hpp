@@ -111,15 +111,17 @@ enum class FaultKind : std::uint8_t {
   supply_panel,           ///< `register` is set to `value` on the front panel
   supply_sag,             ///< its output falls by `volts`
   // the air sensor on USB, and an instrument there
-  ambient_unplug,    ///< pulled out during for_s, then plugged in again
-  ambient_no_reply,  ///< the command was obeyed, its answer never comes
-  ambient_late,      ///< its answer comes after `delay_s`
-  ambient_stall,     ///< the endpoint of the answers halts
+  ambient_unplug,      ///< pulled out during for_s, then plugged in again
+  ambient_no_reply,    ///< the command was obeyed, its answer never comes
+  ambient_late,        ///< its answer comes after `delay_s`
+  ambient_stall,       ///< the endpoint of the answers halts
+  ambient_slow_close,  ///< letting its interface go takes `delay_s`
   // its bridge and bus
   ambient_nack,       ///< the address is not acknowledged
   ambient_busy,       ///< the bridge is still occupied
   ambient_stuck_bus,  ///< SDA is held low: no start condition
   // its sensor
+  ambient_warm,      ///< warmer than the air by `celsius`, as beside a warm board, and drier by as much
   ambient_reads_as,  ///< `register` reads `value`, say a damaged byte of the calibration
   // only an instrument
   usb_wrong_tag,      ///< the answer has the tag of another request

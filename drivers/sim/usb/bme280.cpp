@@ -52,6 +52,9 @@ double humidity_counts(double percent, double fine, const Bme280Constants& c) no
   return counts(bent / gain + c.h4 * 64 + c.h5 / 16384.0 * v, kManyHumid);
 }
 
+/// Vapour pressure of saturated air, any unit (Magnus).
+double saturation(double celsius) { return std::exp(17.62 * celsius / (243.12 + celsius)); }
+
 }  // namespace
 
 Bme280::Bme280(const TrueAir& air, std::uint8_t address, const Bme280Constants& constants)
@@ -134,12 +137,14 @@ void Bme280::finish_measurement() {
     registers_[at + 2u] = static_cast<std::uint8_t>(n << 4);
   };
   const std::uint8_t control = registers_[kControlMeasure];
-  const double temperature = temperature_counts(air_.temperature_c, constants_);
+  const double celsius = air_.temperature_c + warmth_;
+  const double drier = saturation(air_.temperature_c) / saturation(celsius);
+  const double temperature = temperature_counts(celsius, constants_);
   const double fine = t_fine(temperature, constants_);
   twenty(kTemperature, control >> 5 != 0 ? temperature : 0x80000);
   twenty(kPressure, (control >> 2 & 7) != 0 ? pressure_counts(air_.pressure_pa, fine, constants_) : 0x80000);
   const double humid =
-      humidity_control_ != 0 ? humidity_counts(100 * air_.relative_humidity, fine, constants_) : 0x8000;
+      humidity_control_ != 0 ? humidity_counts(100 * drier * air_.relative_humidity, fine, constants_) : 0x8000;
   registers_[kHumidity] = static_cast<std::uint8_t>(static_cast<unsigned>(humid) >> 8);
   registers_[kHumidity + 1u] = static_cast<std::uint8_t>(static_cast<unsigned>(humid));
 }

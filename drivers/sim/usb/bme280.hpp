@@ -29,6 +29,8 @@ class Bme280 {
   explicit Bme280(const TrueAir& air = {}, std::uint8_t address = 0x76, const Bme280Constants& constants = {});
 
   void set_air(const TrueAir& air) noexcept { air_ = air; }
+  /// The chip is warmer than the air, °C; the air at it is drier by as much.
+  void warm_by(double celsius) noexcept { warmth_ = celsius; }
   [[nodiscard]] std::uint8_t address() const noexcept { return address_; }
 
   /// One I²C write: the number of a register alone, or pairs of a register and its value.
@@ -48,6 +50,7 @@ class Bme280 {
   void advance(Instant now);
 
   TrueAir air_;
+  double warmth_ = 0;
   const std::uint8_t address_;
   const Bme280Constants constants_;
   std::array<std::uint8_t, 256> registers_{};

@@ -54,6 +54,8 @@ class UsbFunction {
   /// Asked again and again while it has nothing yet, until the host gives up.
   virtual UsbAnswer in(std::uint8_t endpoint, std::size_t at_most) = 0;
   virtual void halt_cleared(std::uint8_t endpoint) { (void)endpoint; }
+  /// How long it takes to let its interface go, wall time.
+  [[nodiscard]] virtual Duration release_takes() { return {}; }
 };
 
 /// A script in progress. Thread-safe.

@@ -96,10 +96,17 @@ void Mcp2221::halt_cleared(std::uint8_t) {
   halted_ = false;
 }
 
+Duration Mcp2221::release_takes() {
+  const auto slow = faults_.strikes(FaultKind::ambient_slow_close);
+  return slow ? slow->delay : Duration{};
+}
+
 Mcp2221::Report Mcp2221::apply(const Report& command) {
   Report answer{};
   answer[0] = command[0];
   busy_ = faults_.strikes(FaultKind::ambient_busy).has_value();
+  const auto warm = faults_.strikes(FaultKind::ambient_warm);
+  sensor_.warm_by(warm ? warm->coil : 0);
   const std::uint8_t code = command[0];
   if (code == kStatusAndSet)
     status(command, answer);

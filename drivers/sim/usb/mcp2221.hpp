@@ -30,6 +30,7 @@ class Mcp2221 final : public UsbFunction {
   UsbAnswer out(std::uint8_t endpoint, std::span<const std::uint8_t> bytes) override;
   UsbAnswer in(std::uint8_t endpoint, std::size_t at_most) override;
   void halt_cleared(std::uint8_t endpoint) override;
+  [[nodiscard]] Duration release_takes() override;
 
   /// Any thread.
   void set_air(const TrueAir& air);

@@ -95,5 +95,25 @@ TEST_F(BenchAudit, WarnsOfAnotherBufferSize) {
   EXPECT_THAT(found_.at(0).finding.what, HasSubstr("10 records per datagram"));
 }
 
+TEST_F(BenchAudit, TakesAModuleWithoutClient84OrVoltsLimitByNameAndRunsIt) {
+  sim::BenchSettings lacking;
+  lacking.module.quirks.no_power_safety = lacking.module.quirks.no_volts_limit = true;
+  bench_.emplace(config_, lacking);
+  EXPECT_THAT(test::words_of<ConfigurationError>([&] { return audit_bench(*bench_, campaign_, config_); }),
+              HasSubstr("no answer from the module for volts_limit, fault_now"));
+  config_.iq.accept_without = {"power_safety", "volts_limit"};
+  found_ = audit_bench(*bench_, campaign_, config_);
+  ASSERT_EQ(found_.size(), 3u);
+  EXPECT_THAT(found_[2].finding.what, HasSubstr("does not know brushless_drive.volts_limit, power_safety"));
+  bench_->mounted("5x3", 0);
+  const std::uint64_t timeouts = bench_->motor().counts()[2];  // of the audit
+  const test::TemporaryFolder folder;
+  Progress silent;
+  const RunResult run =
+      record_run(*bench_, test::first_run(campaign_, config_, folder.path() / "run.h5"), silent, test::never);
+  EXPECT_EQ(run.account.lost_host, 0u);
+  EXPECT_EQ(bench_->motor().counts()[2], timeouts) << "nothing is asked that has no answer";
+}
+
 }  // namespace bench_audit_test
 }  // namespace kphi::daq

@@ -175,5 +175,35 @@ TEST_F(AmbientWorkerTest, EndsAtOnceBetweenTwoReadings) {
   EXPECT_EQ(script.alive, 0);
 }
 
+TEST(AmbientWorker, DoesNotWaitForASensorThatIsSlowToClose) {
+  struct Slow final : Ambient {
+    explicit Slow(std::shared_ptr<Script> of) : script(std::move(of)) {}
+    ~Slow() override {
+      std::unique_lock lock(script->mutex);
+      script->changed.wait(lock, [&] { return !script->held; });
+      --script->alive;
+      script->changed.notify_all();
+    }
+    Air read() override { return {20, 1e5, 0.5, 0, 0, 0}; }
+    const std::string& identity() const noexcept override { return name; }
+    std::string name = "slow";
+    std::shared_ptr<Script> script;
+  };
+  const auto script = std::make_shared<Script>();
+  script->alive = 1;
+  script->held = true;
+  const auto began = std::chrono::steady_clock::now();
+  {
+    const SteadyClock clock;
+    const AmbientWorker worker([script] { return std::make_unique<Slow>(script); }, clock);
+    EXPECT_TRUE(worker.wait_for_first(10s));
+  }
+  const auto took = std::chrono::steady_clock::now() - began;
+  EXPECT_GE(took, AmbientWorker::kPatience);
+  EXPECT_LT(took, AmbientWorker::kPatience + 5s);
+  script->set([&] { script->held = false; });
+  EXPECT_TRUE(script->wait([&] { return script->alive == 0; })) << "it is closed all the same";
+}
+
 }  // namespace ambient_worker_test
 }  // namespace kphi::ambient

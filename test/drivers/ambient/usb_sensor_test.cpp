@@ -200,5 +200,21 @@ TEST_F(UsbSensorTest, IsPulledOutAndPluggedInAsAScriptSays) {
   ASSERT_TRUE(soon([&] { return bus.list().size() == 1; }));
 }
 
+TEST_F(UsbSensorTest, IsOpenedAgainAfterABridgeThatWasSlowToLetGo) {
+  auto air = plugged_sensor();
+  expect_true_air(*air);
+  break_with(FaultKind::ambient_slow_close, 1, 400ms);
+  const auto began = std::chrono::steady_clock::now();
+  air.reset();
+  EXPECT_GE(std::chrono::steady_clock::now() - began, 400ms);
+  expect_true_air(*sensor());
+}
+
+TEST_F(UsbSensorTest, BearsTransfersThatTakeAlmostHalfASecond) {
+  const auto air = plugged_sensor();
+  break_with(FaultKind::ambient_late, 3, 440ms);
+  expect_true_air(*air);
+}
+
 }  // namespace usb_sensor_test
 }  // namespace kphi::ambient

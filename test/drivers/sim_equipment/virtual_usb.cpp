@@ -173,8 +173,10 @@ class VirtualUsb::Socket {
         return complete(-1, ENODATA);
       case USBDEVFS_IOCTL:  // detach or attach the kernel's driver: there is none
         return complete(-1, ENODATA);
-      case USBDEVFS_CLAIMINTERFACE:
       case USBDEVFS_RELEASEINTERFACE:
+        std::this_thread::sleep_for(function_.release_takes());
+        return complete(0, 0);
+      case USBDEVFS_CLAIMINTERFACE:
       case USBDEVFS_SETINTERFACE:
       case USBDEVFS_RESET:
       case USBDEVFS_DISCONNECT_CLAIM:
