@@ -14,6 +14,7 @@ struct LastWord {
   unsigned number = 0;  ///< port, or baud
   std::string bytes;
   std::string answer{};  ///< bytes that the device answers with; empty: it does not answer
+  std::string from{};    ///< own address to speak from; empty: as the kernel routes
   std::string lock{};    ///< file whose lock the device's user holds; whoever has it by then is not disturbed
 };
 

@@ -33,13 +33,24 @@ std::size_t TcpClient::carry_out(const char* step, Start&& start) {
   return count;
 }
 
-void TcpClient::connect(const std::string& host, std::uint16_t port) {
-  error_code unknown;
-  const auto addresses = asio::ip::tcp::resolver(io_).resolve(host, std::to_string(port), unknown);
-  if (unknown) throw TcpError(Cause::unknown_name, unknown.message());
-  carry_out("connect", [&](auto done) {
-    stream_.async_connect(addresses, [done](error_code error, const auto&) mutable { done(error, 0); });
-  });
+void TcpClient::connect(const Host& host, std::uint16_t port) {
+  error_code error;
+  const auto addresses = asio::ip::tcp::resolver(io_).resolve(host.name, std::to_string(port), error);
+  if (error) throw TcpError(Cause::unknown_name, error.message());
+  if (host.from.empty()) {
+    carry_out("connect", [&](auto done) {
+      stream_.async_connect(addresses, [done](error_code result, const auto&) mutable { done(result, 0); });
+    });
+    return;
+  }
+  const asio::ip::tcp::endpoint to = *addresses.begin();
+  const asio::ip::address own = asio::ip::make_address(host.from, error);
+  auto& socket = stream_.socket();
+  if (!error) socket.open(to.protocol(), error);
+  if (!error) socket.bind({own, 0}, error);
+  if (error) throw TcpError(Cause::no_such_address, "cannot speak from " + host.from + ": " + error.message());
+  carry_out("connect",
+            [&](auto done) { stream_.async_connect(to, [done](error_code result) mutable { done(result, 0); }); });
 }
 
 void TcpClient::send(std::string_view bytes) {

@@ -8,12 +8,21 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace kphi {
 
+/// A name or address, and the address of this computer to speak from where several network cards could; empty: as the
+/// kernel routes.
+struct Host {
+  Host(const char* host) : name(host) {}  // most are only a name
+  Host(std::string host, std::string own = {}) : name(std::move(host)), from(std::move(own)) {}
+  std::string name, from;
+};
+
 class TcpError : public std::runtime_error {
  public:
-  enum class Cause : std::uint8_t { unknown_name, refused, timeout, reset, other };
+  enum class Cause : std::uint8_t { unknown_name, no_such_address, refused, timeout, reset, other };
   TcpError(Cause why, const std::string& words) : std::runtime_error(words), cause(why) {}
   Cause cause;
 };
@@ -26,7 +35,7 @@ class TcpClient {
   /// A new limit from here on.
   void allow(std::chrono::nanoseconds wall_timeout) { stream_.expires_after(wall_timeout); }
   /// Throws TcpError, as the others do.
-  void connect(const std::string& host, std::uint16_t port);
+  void connect(const Host& host, std::uint16_t port);
   void send(std::string_view bytes);
   /// Appends the bytes received next, at least one; false when the peer has closed the connection.
   [[nodiscard]] bool receive(std::string& to);

@@ -67,7 +67,8 @@ netbox::ProbeSettings probe_settings(const DevicesRequest& asked, const std::opt
 
 DeviceAnswer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& clock,
                            const netbox::ProbeSettings& settings) {
-  const netbox::Probe probe = netbox::probe({config.host, config.rdt_port, config.http_port}, clock, settings);
+  const netbox::Probe probe =
+      netbox::probe({config.host, config.rdt_port, config.http_port, config.bind}, clock, settings);
   DeviceAnswer answer{"Net Box " + config.host, probe.answers(), probe.lines(), {}};
   if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
   if (probe.streamed) answer.details["stream"] = to_json(probe.counters, probe.health);

@@ -24,6 +24,7 @@ void agree(ProfileReader& file, const std::string& key, const std::optional<T>& 
 NetBoxConfig read_netbox(ProfileReader& file) {
   NetBoxConfig config;
   config.host = file.text("/netbox/host");
+  config.bind = file.get_or("/netbox/bind", config.bind);
   config.rdt_port = file.get_or("/netbox/rdt_port", config.rdt_port);
   config.http_port = file.get_or("/netbox/http_port", config.http_port);
   config.tcp_port = file.get_or("/netbox/tcp_port", static_cast<std::uint16_t>(config.rdt_port - 1));

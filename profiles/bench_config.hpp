@@ -22,6 +22,7 @@ struct NetBoxSettings {
 
 struct NetBoxConfig {
   std::string host;  ///< name or address
+  std::string bind;  ///< address of this computer to speak from; empty: as the kernel routes
   std::uint16_t rdt_port = 49152;
   std::uint16_t http_port = 80;
   std::uint16_t tcp_port = 49151;  ///< one below rdt_port unless the file says otherwise

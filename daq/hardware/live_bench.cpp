@@ -41,7 +41,7 @@ iq::Settings motor_settings(const profiles::MotorConfig& config) {
 }
 
 netbox::Address rdt_address(const profiles::NetBoxConfig& config) {
-  return {config.host, config.rdt_port, config.http_port};
+  return {config.host, config.rdt_port, config.http_port, config.bind};
 }
 
 netbox::WantedSettings wanted_settings(const profiles::NetBoxConfig& config) {
@@ -70,7 +70,7 @@ std::filesystem::path settings_journal(const profiles::NetBoxConfig& config) {
 }
 
 std::string page_of(const profiles::NetBoxConfig& config, const std::string& target) {
-  return netbox::http_get(config.host, config.http_port, target, kPageTimeout);
+  return netbox::http_get({config.host, config.bind}, config.http_port, target, kPageTimeout);
 }
 
 void require_no_stop(const std::function<bool()>& stop_asked) {
@@ -86,6 +86,7 @@ std::vector<LastWord> last_words(const profiles::BenchConfig& config, const Live
   if (!config.load_cell) {
     words.push_back({"stream of the Net Box " + box.host, LastWord::Wire::udp, box.host, box.rdt_port,
                      std::string(stop.begin(), stop.end())});
+    words.back().from = box.bind;
     words.back().lock = lock_file(names.front());
   }
   if (supply == nullptr || !supply->off()) return words;
@@ -212,7 +213,8 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
       // Checks that the box answers before anybody mounts anything.
       cell_(std::make_unique<netbox::LoadCell>(rdt_address(config_), clock_)),
       findings_(settings_.notes()) {
-  if (auto finding = netbox::cross_check(config_.host, config_.tcp_port, cell_->configuration(), kCalinfoTimeout)) {
+  if (auto finding = netbox::cross_check({config_.host, config_.bind}, config_.tcp_port, cell_->configuration(),
+                                         kCalinfoTimeout)) {
     if (finding->severity == Severity::fault)
       throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));

@@ -57,7 +57,7 @@ std::vector<std::string> arguments_of(const std::vector<LastWord>& words) {
   std::vector<std::string> all{kProgram};
   for (const LastWord& word : words)
     all.insert(all.end(), {word.device, kWires.at(static_cast<std::size_t>(word.wire)), address_of(word),
-                           std::to_string(word.number), in_hex(word.bytes), in_hex(word.answer), word.lock});
+                           std::to_string(word.number), in_hex(word.bytes), in_hex(word.answer), word.from, word.lock});
   return all;
 }
 

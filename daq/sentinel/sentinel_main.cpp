@@ -1,7 +1,7 @@
 // kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
 // its end. Needs the C library alone, so that it is small and nothing in it can fail.
-// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER LOCK)…, bytes in hexadecimal digits. Its
-// standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
+// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER FROM LOCK)…, bytes in hexadecimal digits.
+// Its standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
@@ -22,7 +22,7 @@
 
 namespace {
 
-constexpr int kTries = 5, kFieldsOfAWord = 7, kMostWords = 8;
+constexpr int kTries = 5, kFieldsOfAWord = 8, kMostWords = 8;
 constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700, kLockFreed_ms = 100;
 constexpr unsigned kTooLong_s = 20;
 
@@ -48,12 +48,14 @@ struct Word {
         number(static_cast<unsigned>(strtoul(fields[3], nullptr, 10))),
         bytes(from_hex(fields[4])),
         answer(from_hex(fields[5])),
-        lock(fields[6]) {}
+        from(fields[6]),
+        lock(fields[7]) {}
   const char* device;
   const char* wire;
   const char* where;
   unsigned number;
   Bytes bytes, answer;
+  const char* from;
   const char* lock;
 };
 
@@ -107,6 +109,11 @@ int opened_socket(const Word& word, int type) {
   }
   const int file = socket(to.ss_family, type | SOCK_NONBLOCK, 0);
   if (file < 0) return -1;
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  // Where its card is gone, the kernel may still know another way.
+  if (inet_pton(AF_INET, word.from, &own.sin_addr) == 1)
+    (void)!bind(file, reinterpret_cast<sockaddr*>(&own), sizeof own);
   if (connect(file, reinterpret_cast<sockaddr*>(&to), length) == 0) return file;
   if (errno == EINPROGRESS && within(file, POLLOUT, kConnect_ms)) return file;
   close(file);

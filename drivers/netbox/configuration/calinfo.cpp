@@ -34,9 +34,9 @@ std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexc
   return Calinfo{bytes[2], bytes[3], boost::endian::load_big_u32(&bytes[4]), boost::endian::load_big_u32(&bytes[8])};
 }
 
-Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout) {
+Calinfo read_calinfo(const Host& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout) {
   const auto fail = [&](const std::string& cause, const char* next_move) {
-    throw DeviceError(fmt::format("Net Box {}:{}", host, port), "read the calibration over TCP", cause, next_move);
+    throw DeviceError(fmt::format("Net Box {}:{}", host.name, port), "read the calibration over TCP", cause, next_move);
   };
   TcpClient box(wall_timeout);
   std::string answer;
@@ -76,7 +76,7 @@ std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& conf
       "power-cycle the box and read again; do not measure until they agree"};
 }
 
-std::optional<Finding> cross_check(const std::string& host, std::uint16_t port, const Configuration& configuration,
+std::optional<Finding> cross_check(const Host& host, std::uint16_t port, const Configuration& configuration,
                                    std::chrono::nanoseconds wall_timeout) {
   try {
     return compare(read_calinfo(host, port, wall_timeout), configuration);

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/finding.hpp"
+#include "base/tcp.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 
 namespace kphi::netbox {
@@ -27,12 +28,12 @@ struct Calinfo {
 [[nodiscard]] std::optional<Calinfo> decode_calinfo(std::span<const std::uint8_t> bytes) noexcept;
 
 /// Blocks for at most `wall_timeout`. Throws DeviceError without a connection or a complete, valid answer.
-[[nodiscard]] Calinfo read_calinfo(const std::string& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout);
+[[nodiscard]] Calinfo read_calinfo(const Host& host, std::uint16_t port, std::chrono::nanoseconds wall_timeout);
 
 /// A fault when the two disagree about counts per newton or newton-metre by more than 1 in 10^6 or a unit is unknown.
 [[nodiscard]] std::optional<Finding> compare(const Calinfo& calinfo, const Configuration& configuration);
 /// read_calinfo and compare; a note if the box does not answer there.
-[[nodiscard]] std::optional<Finding> cross_check(const std::string& host, std::uint16_t port,
+[[nodiscard]] std::optional<Finding> cross_check(const Host& host, std::uint16_t port,
                                                  const Configuration& configuration,
                                                  std::chrono::nanoseconds wall_timeout);
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/tcp.hpp"
 #include "drivers/netbox/wire/status.hpp"
 
 namespace kphi::netbox {
@@ -30,6 +31,9 @@ struct Address {
   std::string host;
   std::uint16_t rdt_port = 49152;
   std::uint16_t http_port = 80;
+  std::string from{};  ///< address of this computer to speak from; empty: as the kernel routes
+
+  [[nodiscard]] Host where() const { return {host, from}; }
 };
 
 struct Configuration {

@@ -107,6 +107,8 @@ std::string advice(const TcpError& error, const std::string& host, std::uint16_t
   if (error.cause == TcpError::Cause::refused)
     return fmt::format("a device is at this address, but no web server on port {}: check the address and http_port",
                        port);
+  if (error.cause == TcpError::Cause::no_such_address)
+    return "bind in the bench file must be an address of this computer: `ip -4 address`";
   if (const std::string other = advice_to_reach(host, interfaces()); !other.empty()) return other;
   const std::string all = "check the address, the cable and the box's power";
   if (error.cause != TcpError::Cause::timeout) return all;
@@ -115,14 +117,14 @@ std::string advice(const TcpError& error, const std::string& host, std::uint16_t
 
 }  // namespace
 
-std::string http_get(const std::string& host, std::uint16_t port, const std::string& target,
+std::string http_get(const Host& host, std::uint16_t port, const std::string& target,
                      std::chrono::nanoseconds wall_timeout, int wanted_status) {
-  const std::string device = fmt::format("Net Box {}:{}", host, port);
+  const std::string device = fmt::format("Net Box {}:{}", host.name, port);
   const std::string operation = "GET " + target;
   TcpClient box(wall_timeout);
   try {
     box.connect(host, port);
-    box.send(fmt::format("{} HTTP/1.0\r\nHost: {}\r\n\r\n", operation, host));
+    box.send(fmt::format("{} HTTP/1.0\r\nHost: {}\r\n\r\n", operation, host.name));
     http::response<http::string_body> response = read_response(box);
     if (static_cast<int>(response.result_int()) == wanted_status) return std::move(response.body());
     throw DeviceError(device, operation, fmt::format("HTTP status {}", response.result_int()),
@@ -135,7 +137,7 @@ std::string http_get(const std::string& host, std::uint16_t port, const std::str
                       error.cause == TcpError::Cause::timeout
                           ? fmt::format("no answer within {:.1f} s (could not {})", seconds, box.step())
                           : fmt::format("could not {}: {}", box.step(), error.what()),
-                      advice(error, host, port));
+                      advice(error, host.name, port));
   }
 }
 

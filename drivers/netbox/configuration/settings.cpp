@@ -48,7 +48,7 @@ std::string device(const Address& address) { return "Net Box " + address.host; }
 class Shown {
  public:
   explicit Shown(const Address& address)
-      : device_(device(address)), xml_(http_get(address.host, address.http_port, "/netftapi2.xml", kTimeout)) {
+      : device_(device(address)), xml_(http_get(address.where(), address.http_port, "/netftapi2.xml", kTimeout)) {
     document_.load_buffer(xml_.data(), xml_.size());
   }
   [[nodiscard]] std::string text(const char* key) const { return document_.child("netft").child_value(key); }
@@ -79,7 +79,7 @@ void write_once(const Address& address, const std::vector<Assignment>& assignmen
         query += fmt::format("{}{}={}", query.empty() ? '?' : '&', a.setting->key, a.asked);
     }
     if (!query.empty())
-      (void)http_get(address.host, address.http_port, fmt::format("/{}{}", page, query), kTimeout, kFound);
+      (void)http_get(address.where(), address.http_port, fmt::format("/{}{}", page, query), kTimeout, kFound);
   }
 }
 
@@ -132,7 +132,8 @@ std::vector<Assignment> differences(const Shown& shown, const Configuration& box
 std::vector<std::string> read_slots(const Address& address) {
   std::vector<std::string> slots;
   for (int slot = 0; slot < kSlots; ++slot)
-    slots.push_back(http_get(address.host, address.http_port, fmt::format("/netftapi2.xml?index={}", slot), kTimeout));
+    slots.push_back(
+        http_get(address.where(), address.http_port, fmt::format("/netftapi2.xml?index={}", slot), kTimeout));
   return slots;
 }
 

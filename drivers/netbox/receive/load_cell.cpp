@@ -27,7 +27,7 @@ constexpr std::chrono::nanoseconds kLongestLinger = 250ms, kQuiet = 50ms;
 constexpr int kBatchesPerDrain = 64;
 
 std::string fetch_configuration(const Address& address, std::chrono::nanoseconds wall_timeout) {
-  return http_get(address.host, address.http_port, "/netftapi2.xml", wall_timeout);
+  return http_get(address.where(), address.http_port, "/netftapi2.xml", wall_timeout);
 }
 
 /// True if a descriptor became readable within `wall`.
@@ -47,7 +47,7 @@ LoadCell::LoadCell(const Address& address, const Clock& clock)
     : address_(address),
       clock_(clock),
       configuration_(parse_configuration(fetch_configuration(address, kHttpTimeout), "Net Box " + address.host)),
-      socket_(address.host, address.rdt_port),
+      socket_(address.where(), address.rdt_port),
       connection_(configuration_, to_seconds(clock.stretched(1s))),
       inquirer_(start_thread({"box inquiries"}, [this] { answer_questions(); })) {}
 

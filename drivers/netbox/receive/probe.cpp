@@ -103,7 +103,7 @@ Probe probe(const Address& address, const Clock& clock, const ProbeSettings& set
     found.configuration = cell.configuration();
     found.findings = audit(*found.configuration, settings.intention);
     if (auto finding = cell.receive_buffer().finding()) found.findings.push_back(std::move(*finding));
-    if (auto finding = cross_check(address.host, settings.tcp_port, *found.configuration, settings.tcp_timeout))
+    if (auto finding = cross_check(address.where(), settings.tcp_port, *found.configuration, settings.tcp_timeout))
       found.findings.push_back(std::move(*finding));
     look_at_stream(found, cell, clock, settings.stream);
   } catch (const DeviceError& error) {

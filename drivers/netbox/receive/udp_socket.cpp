@@ -1,5 +1,6 @@
 #include "drivers/netbox/receive/udp_socket.hpp"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netdb.h>
 #include <sys/socket.h>
@@ -43,17 +44,23 @@ struct UdpSocket::Slots {
   std::array<mmsghdr, kBatch> headers{};
 };
 
-UdpSocket::UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes)
+UdpSocket::UdpSocket(const Host& host, std::uint16_t port, std::size_t buffer_bytes)
     : slots_(std::make_unique<Slots>()) {
-  const std::string device = fmt::format("Net Box {}:{}", host, port);
+  const std::string device = fmt::format("Net Box {}:{}", host.name, port);
   addrinfo wanted{}, *found = nullptr;
   wanted.ai_family = AF_INET;  // the box speaks IPv4 only
   wanted.ai_socktype = SOCK_DGRAM;
-  const int unknown = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &wanted, &found);
+  const int unknown = getaddrinfo(host.name.c_str(), std::to_string(port).c_str(), &wanted, &found);
   if (unknown != 0)
     throw DeviceError(device, "look up the name", gai_strerror(unknown), "check the host in the bench file");
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> address(found, &freeaddrinfo);
   socket_ = Descriptor(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  if (!host.from.empty() && (inet_pton(AF_INET, host.from.c_str(), &own.sin_addr) != 1 ||
+                             bind(descriptor(), reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0))
+    throw DeviceError(device, "speak from " + host.from, std::strerror(errno),
+                      "bind in the bench file must be an address of this computer: `ip -4 address`");
   if (connect(descriptor(), address->ai_addr, address->ai_addrlen) != 0)
     throw DeviceError(device, "open a UDP socket", std::strerror(errno), "check this computer's network settings");
   ask_for_buffer(buffer_bytes);

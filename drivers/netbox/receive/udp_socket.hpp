@@ -13,6 +13,7 @@
 
 #include "base/descriptor.hpp"
 #include "base/finding.hpp"
+#include "base/tcp.hpp"
 
 namespace kphi::netbox {
 
@@ -29,7 +30,7 @@ class UdpSocket {
 
   /// Connects, so that only this peer's datagrams come in. Asks for `buffer_bytes` of receive buffer, and takes what
   /// the kernel grants. Throws DeviceError.
-  UdpSocket(const std::string& host, std::uint16_t port, std::size_t buffer_bytes = kWantedBuffer);
+  UdpSocket(const Host& host, std::uint16_t port, std::size_t buffer_bytes = kWantedBuffer);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
   UdpSocket& operator=(const UdpSocket&) = delete;

@@ -58,16 +58,23 @@ class Device {
   /// The next message; "" after a long silence. It is answered with `answer`.
   [[nodiscard]] std::string heard(const std::string& answer = {}) const {
     if (!readable(socket_.number())) return "";
-    const Descriptor connection(wire_ == Wire::tcp ? ::accept(socket_.number(), nullptr, nullptr) : -1);
+    sockaddr_in there{};
+    socklen_t size = sizeof there;
+    const Descriptor connection(
+        wire_ == Wire::tcp ? ::accept(socket_.number(), reinterpret_cast<sockaddr*>(&there), &size) : -1);
     const int from = wire_ == Wire::tcp ? connection.number() : socket_.number();
     std::array<char, 64> bytes{};
     if (!readable(from)) return "";
-    const ssize_t n = ::read(from, bytes.data(), bytes.size());
+    const ssize_t n = wire_ == Wire::tcp
+                          ? ::read(from, bytes.data(), bytes.size())
+                          : ::recvfrom(from, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&there), &size);
+    speaker = ntohl(there.sin_addr.s_addr);
     if (!answer.empty()) {
       EXPECT_EQ(::write(from, answer.data(), answer.size()), static_cast<ssize_t>(answer.size()));
     }
     return {bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0))};
   }
+  mutable std::uint32_t speaker = 0;  ///< address of the last one that was heard
   [[nodiscard]] bool is_left_alone() const { return !readable(socket_.number(), 0); }
 
  private:
@@ -99,6 +106,17 @@ TEST(Sentinel, SaysTheLastWordsOfAProgramThatWasKilled) {
   let_a_program_end({box.word(stop), supply.word(off, off.substr(6))}, be_killed);
   EXPECT_EQ(box.heard(), stop);
   EXPECT_EQ(supply.heard(off), off);
+}
+
+TEST(Sentinel, SpeaksFromTheAddressOfTheBenchFile) {
+  const Device box(Wire::udp), supply(Wire::tcp);
+  std::vector<LastWord> words{box.word("stop"), supply.word("off", "off")};
+  for (LastWord& word : words) word.where = "127.0.0.1", word.from = "127.0.0.3";
+  let_a_program_end(words, be_killed);
+  EXPECT_EQ(box.heard(), "stop");
+  EXPECT_EQ(supply.heard("off"), "off");
+  EXPECT_EQ(box.speaker, 0x7f000003u);
+  EXPECT_EQ(supply.speaker, 0x7f000003u);
 }
 
 TEST(Sentinel, SaysThemAlsoOfOneThatLeftWithoutAWord) {

@@ -121,6 +121,19 @@ TEST(UdpSocket, AsksForFourMebibytesAndReadsBackWhatItGot) {
   EXPECT_GT(granted, 0);
 }
 
+TEST(UdpSocket, SpeaksFromTheAddressThatItIsToldAndRefusesOneThatIsNotItsOwn) {
+  LoopbackSocket box{SOCK_DGRAM};
+  UdpSocket socket({"127.0.0.1", "127.0.0.3"}, box.port());
+  sockaddr_in own{};
+  socklen_t length = sizeof own;
+  getsockname(socket.descriptor(), reinterpret_cast<sockaddr*>(&own), &length);
+  EXPECT_EQ(ntohl(own.sin_addr.s_addr), 0x7f000003u);
+  EXPECT_THAT(refusal([&] {
+                UdpSocket({"127.0.0.1", "203.0.113.9"}, box.port());
+              }),
+              testing::HasSubstr("bind in the bench file must be an address of this computer"));
+}
+
 TEST(UdpSocket, AnUnknownNameIsAnError) { EXPECT_THROW(UdpSocket("no such host", 1), DeviceError); }
 
 TEST(ReceiveBuffer, HoldsWhatWasMeasured) {
