@@ -7,11 +7,11 @@
 namespace kphi {
 
 struct LastWord {
-  enum class Wire : std::uint8_t { udp, tcp, serial };
+  enum class Wire : std::uint8_t { udp, tcp, serial, usb };
   std::string device;  ///< for messages: "supply RD6024 on /dev/ttyUSB1"
   Wire wire = Wire::udp;
-  std::string where;    ///< host, or path of the serial port
-  unsigned number = 0;  ///< port, or baud
+  std::string where;    ///< host, or path of the serial port, or of the device on USB
+  unsigned number = 0;  ///< port, or baud, or of a USBTMC instrument: interface + 256 · endpoint of its messages
   std::string bytes;
   std::string answer{};  ///< bytes that the device answers with; empty: it does not answer
   std::string from{};    ///< own address to speak from; empty: as the kernel routes

@@ -40,7 +40,7 @@ std::string in_hex(const std::string& bytes) {
 
 /// By number, since the sentinel asks no name server.
 std::string address_of(const LastWord& word) {
-  if (word.wire == LastWord::Wire::serial) return word.where;
+  if (word.wire == LastWord::Wire::serial || word.wire == LastWord::Wire::usb) return word.where;
   addrinfo wanted{};
   wanted.ai_socktype = SOCK_DGRAM;
   addrinfo* found = nullptr;
@@ -53,7 +53,7 @@ std::string address_of(const LastWord& word) {
 }
 
 std::vector<std::string> arguments_of(const std::vector<LastWord>& words) {
-  constexpr std::array kWires{"udp", "tcp", "serial"};
+  constexpr std::array kWires{"udp", "tcp", "serial", "usb"};
   std::vector<std::string> all{kProgram};
   for (const LastWord& word : words)
     all.insert(all.end(), {word.device, kWires.at(static_cast<std::size_t>(word.wire)), address_of(word),

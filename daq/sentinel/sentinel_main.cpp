@@ -1,13 +1,15 @@
 // kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
 // its end. Needs the C library alone, so that it is small and nothing in it can fail.
-// Usage: kphi-sentinel (DEVICE udp|tcp|serial WHERE PORT|BAUD BYTES ANSWER FROM LOCK)…, bytes in hexadecimal digits.
-// Its standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
+// Usage: kphi-sentinel (DEVICE udp|tcp|serial|usb WHERE PORT|BAUD|PIPE BYTES ANSWER FROM LOCK)…, bytes in hexadecimal
+// digits. Its standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <linux/usbdevice_fs.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <signal.h>
 #include <sys/file.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <termios.h>
@@ -120,6 +122,51 @@ int opened_socket(const Word& word, int type) {
   return -1;
 }
 
+/// One transfer; the bytes that it moved, -1: none in time.
+int transferred(int file, unsigned char type, unsigned char endpoint, unsigned char* bytes, size_t n) {
+  usbdevfs_urb urb{};
+  urb.type = type;
+  urb.endpoint = endpoint;
+  urb.buffer = bytes;
+  urb.buffer_length = static_cast<int>(n);
+  if (ioctl(file, USBDEVFS_SUBMITURB, &urb) != 0) return -1;
+  usbdevfs_urb* ended = nullptr;
+  for (int waited = 0; ioctl(file, USBDEVFS_REAPURBNDELAY, &ended) != 0; ++waited) {
+    if (errno != EAGAIN) return -1;
+    if (waited == kAnswer_ms) ioctl(file, USBDEVFS_DISCARDURB, &urb);
+    if (waited > 2 * kAnswer_ms) return -1;
+    poll(nullptr, 0, 1);
+  }
+  return urb.status == 0 ? urb.actual_length : -1;
+}
+
+/// A USBTMC request to the interface (USBTMC 4.2.1), and the status that answers it.
+int requested(int file, unsigned char request, unsigned char interface, unsigned char answers) {
+  unsigned char setup[10] = {0xA1, request, 0, 0, interface, 0, answers, 0};
+  return transferred(file, USBDEVFS_URB_TYPE_CONTROL, 0, setup, 8u + answers) > 0 ? setup[8] : -1;
+}
+
+/// To a USBTMC instrument that its dead program may have left in the middle of a message.
+bool told_over_usb(const Word& word) {
+  constexpr unsigned char kClear = 5, kCheckClear = 6, kPending = 2;
+  auto interface = static_cast<unsigned char>(word.number & 0xFF);
+  unsigned endpoint = word.number >> 8;
+  const int file = open(word.where, O_RDWR);
+  if (file < 0) return false;
+  usbdevfs_disconnect_claim claim{};
+  claim.interface = interface;
+  unsigned number = interface;
+  if (ioctl(file, USBDEVFS_DISCONNECT_CLAIM, &claim) != 0) ioctl(file, USBDEVFS_CLAIMINTERFACE, &number);
+  requested(file, kClear, interface, 1);
+  for (int i = 0; i < kQuiet_ms && requested(file, kCheckClear, interface, 2) == kPending; ++i) poll(nullptr, 0, 1);
+  ioctl(file, USBDEVFS_CLEAR_HALT, &endpoint);
+  Bytes message = word.bytes;
+  const int sent =
+      transferred(file, USBDEVFS_URB_TYPE_BULK, static_cast<unsigned char>(endpoint), message.of, message.n);
+  close(file);
+  return sent == static_cast<int>(message.n);
+}
+
 bool answered(int file, const Bytes& wanted) {
   Bytes seen;
   while (seen.n < sizeof seen.of && within(file, POLLIN, kAnswer_ms)) {
@@ -146,6 +193,11 @@ bool takes(const char* lock) {
 /// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.
 bool say(const Word& word) {
   for (int attempt = 0; attempt < kTries; ++attempt) {
+    if (strcmp(word.wire, "usb") == 0) {
+      if (told_over_usb(word)) return true;
+      poll(nullptr, 0, kQuiet_ms);
+      continue;
+    }
     const bool serial = strcmp(word.wire, "serial") == 0, udp = strcmp(word.wire, "udp") == 0;
     const int file = serial ? opened_serial(word) : opened_socket(word, udp ? SOCK_DGRAM : SOCK_STREAM);
     if (file < 0) {

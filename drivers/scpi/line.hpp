@@ -74,6 +74,7 @@ class Usbtmc : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return transport_.name(); }
+  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, const std::string& device) const override;
 
  private:
   void find_endpoints();

@@ -52,6 +52,14 @@ Usbtmc::Usbtmc(usb::Transport& transport, Timeout timeout) : transport_(transpor
   take_remote_control();
 }
 
+std::optional<LastWord> Usbtmc::last_word(std::string_view command, const std::string& device) const {
+  const std::string file = transport_.device_file();
+  if (file.empty()) return std::nullopt;
+  const auto message = usbtmc::message_out(1, std::string(command) + "\n");
+  return LastWord{device, LastWord::Wire::usb, file, interface_ + 256u * out_.address,
+                  std::string(message.begin(), message.end())};
+}
+
 void Usbtmc::find_endpoints() {
   for (const usb::Interface& candidate : transport_.interfaces()) {
     if (candidate.class_code != kClass || candidate.subclass != kSubclass) continue;

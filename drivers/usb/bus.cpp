@@ -64,6 +64,10 @@ class Device final : public Transport {
   }
 
   const std::string& name() const noexcept override { return name_; }
+  std::string device_file() const override {
+    libusb_device* device = libusb_get_device(handle_);
+    return fmt::format("/dev/bus/usb/{:03}/{:03}", libusb_get_bus_number(device), libusb_get_device_address(device));
+  }
   std::uint16_t vendor() const noexcept override { return listing_.vendor; }
   std::uint16_t product() const noexcept override { return listing_.product; }
   const std::vector<Interface>& interfaces() const noexcept override { return interfaces_; }

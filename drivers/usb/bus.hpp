@@ -80,6 +80,8 @@ class Transport {
 
   /// For messages: "USB device 04d8:00dd, serial 0001, port 1-2".
   [[nodiscard]] virtual const std::string& name() const noexcept = 0;
+  /// "/dev/bus/usb/001/004"; empty: unknown.
+  [[nodiscard]] virtual std::string device_file() const { return {}; }
   [[nodiscard]] virtual std::uint16_t vendor() const noexcept = 0;
   [[nodiscard]] virtual std::uint16_t product() const noexcept = 0;
   [[nodiscard]] virtual const std::vector<Interface>& interfaces() const noexcept = 0;

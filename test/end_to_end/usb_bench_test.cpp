@@ -106,4 +106,18 @@ TEST_F(UsbBench, CoastsWithinAFifthOfASecondWhenTheSupplyIsPulledOut) {
   EXPECT_THAT(kept.events.back().text, HasSubstr("step 2"));
 }
 
+TEST_F(UsbBench, IsSwitchedOffByTheSentinelWhenTheProgramIsKilled) {
+  Process run(run_command());
+  ASSERT_TRUE(bench->await_speed(500)) << run.err();
+  ASSERT_TRUE(instrument.state().output);
+  run.signal(SIGKILL);
+  const auto killed = std::chrono::steady_clock::now();
+  EXPECT_TRUE(soon([&] { return !instrument.state().output; }, std::chrono::seconds(5)));
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - killed;
+  fmt::print("off {:.3f} s after the kill\n", took.count());
+  EXPECT_LT(took.count(), 1);
+  EXPECT_EQ(run.wait(), 128 + SIGKILL);
+  EXPECT_THAT(run.err(), HasSubstr("kphi-sentinel: kphi has died; supply SIM3010"));
+}
+
 }  // namespace kphi::test::usb_bench_test
