@@ -115,6 +115,8 @@ void EscMotor::take(const std::vector<std::int64_t>& line, Instant at) {
   add(MotorChannel::supply_current, 0.01 * static_cast<double>(line[3]));
   add(MotorChannel::drive_pwm, spin_ * applied_ / kMostThrottle);
   add(MotorChannel::drive_mode, static_cast<double>(applied_ == 0 ? iq::DriveMode::coast : iq::DriveMode::spin_pwm));
+  drives_ = wanted_ > 0 && (drives_ || applied_ > 0);
+  if (drives_ && applied_ == 0) give_up(at, EventKind::motor_let_go, "its board let it go by itself");
   if (wanted_ > 0) throttle_ = loop_.throttle(wanted_, speed_, volts_, std::min(seconds, 0.1));
   if (!stopping_.active()) return;
   if (throttle_ == 0 && applied_ == 0) stopping_.confirmed(at);
@@ -124,11 +126,12 @@ void EscMotor::take(const std::vector<std::int64_t>& line, Instant at) {
 
 /// The next line to the board, and everything that must coast the motor.
 void EscMotor::order(Instant now) {
-  if (wanted_ > 0 && clock_.shrunk(now - renewed_) > kLease && !stopping_.active()) {
-    coast(now);
-    lost_ = "kphi did not renew its command in time, so the driver coasted it; close other programs";
-    events_.push_back(daq::event_at(now, EventKind::motor_lease_expired, lost_));
-  }
+  // Also while this computer slept: the board has coasted the motor by then, and an order would turn it again.
+  const Duration here = clock_.shrunk(now) + clock_.suspended();
+  if (here - std::exchange(served_, here) > kBoardSilent)
+    give_up(now, EventKind::motor_host_absent, "this computer did not run the driver, and its board coasted it");
+  if (clock_.shrunk(now - renewed_) > kLease && !stopping_.active())
+    give_up(now, EventKind::motor_lease_expired, "kphi did not renew its command in time, so the driver coasted it");
   if (const auto speed = stopping_.ramp(now)) {
     wanted_ = std::abs(*speed);
     if (wanted_ == 0) coast(now);
@@ -137,6 +140,14 @@ void EscMotor::order(Instant now) {
   if (now < next_order_) return;
   next_order_ = now + clock_.stretched(kEvery);
   send(throttle_);
+}
+
+/// It does not turn again: whoever ordered the speed knows nothing of the pause.
+void EscMotor::give_up(Instant now, EventKind kind, const char* why) {
+  if (wanted_ == 0) return;
+  coast(now);
+  lost_ = why;
+  events_.push_back(daq::event_at(now, kind, why));
 }
 
 void EscMotor::send(int throttle) noexcept {

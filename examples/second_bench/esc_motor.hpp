@@ -59,6 +59,7 @@ class EscMotor final : public daq::MotorLink {
   void hear();
   void take(const std::vector<std::int64_t>& line, Instant at);
   void order(Instant now);
+  void give_up(Instant now, EventKind kind, const char* why);
   void send(int throttle) noexcept;
   void coast(Instant now) noexcept;
   [[nodiscard]] bool stands_by() const;
@@ -76,8 +77,9 @@ class EscMotor final : public daq::MotorLink {
   double wanted_ = 0;  ///< rad/s, unsigned; 0: coast
   double speed_ = 0, volts_ = 0;
   int throttle_ = 0, applied_ = -1;  ///< ordered; as the board says, -1 before its first line
-  Instant renewed_{0}, heard_{0}, coasted_{kNever}, next_order_{0};
-  bool quit_ = false;
+  Instant renewed_{0}, heard_{0}, next_order_{0};
+  Duration served_{0};  ///< wall time, with this computer's sleep
+  bool drives_ = false, quit_ = false;
   std::string lost_;
   std::thread thread_;  ///< last: it uses the members above
 };

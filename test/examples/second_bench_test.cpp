@@ -250,6 +250,16 @@ TEST_F(SecondBench, CoastsByItsBoardWhenKphiIsKilled) {
   EXPECT_TRUE(soon([&] { return throttle() == 0; }));
 }
 
+TEST_F(SecondBench, NeverTurnsAgainAMotorThatItsBoardLetGoWhileKphiStoodStill) {
+  test::Process run(command(test::short_campaign_text("0", 1, 40)));
+  ASSERT_TRUE(soon([&] { return rpm() > 5000; }));
+  ASSERT_TRUE(run.freeze());
+  ASSERT_TRUE(soon([&] { return throttle() == 0; }));
+  run.signal(SIGCONT);  // at once: before the lease is over, and the guard's patience
+  while (run.hear(milliseconds(5))) ASSERT_EQ(throttle(), 0) << run.err();
+  EXPECT_EQ(run.wait(), 4) << run.err();
+}
+
 TEST_F(SecondBench, NamesTheDriversThatThereAreWhereOneIsUnknown) {
   std::string text = profiles::read_text(path("bench.yaml"));
   test::write(path("bench.yaml"), text.replace(text.find("driver: esc"), 11, "driver: esk"));
