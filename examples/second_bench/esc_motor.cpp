@@ -19,7 +19,6 @@ constexpr Duration kLease = std::chrono::milliseconds(500);  // wall time
 constexpr Duration kEvery = std::chrono::milliseconds(10);
 constexpr Duration kConnects = std::chrono::seconds(2);
 constexpr Duration kBoardSilent = std::chrono::milliseconds(200);  // the board coasts after 250
-constexpr double kLeastThrottle = 48, kMostThrottle = 2000;
 constexpr std::size_t kMostReadings = 100'000;
 enum Count : std::size_t { requests = 0, replies = 1, bad = 5 };  // of kMotorCounts
 
@@ -33,16 +32,6 @@ SpeedLoop::Settings settings_of(const profiles::BenchConfig& bench) {
 }
 
 }  // namespace
-
-int SpeedLoop::throttle(double wanted, double measured, double volts, double seconds) noexcept {
-  const double needs = volts > 1 ? kMostThrottle * wanted / (settings_.kv_rad_s_per_v * volts) : kLeastThrottle;
-  const double error = wanted - measured;
-  const double without = needs + settings_.proportional * error;
-  const double next = integral_ + settings_.integral * error * seconds;
-  const double sum = without + next;
-  if (sum > kLeastThrottle && sum < kMostThrottle) integral_ = next;  // else it would wind up
-  return static_cast<int>(std::lround(std::clamp(without + integral_, kLeastThrottle, kMostThrottle)));
-}
 
 EscMotor::EscMotor(const profiles::BenchConfig& bench, const Clock& clock)
     : clock_(clock),
@@ -113,7 +102,7 @@ void EscMotor::take(const std::vector<std::int64_t>& line, Instant at) {
   add(MotorChannel::speed, spin_ * speed_);
   add(MotorChannel::supply_voltage, volts_);
   add(MotorChannel::supply_current, 0.01 * static_cast<double>(line[3]));
-  add(MotorChannel::drive_pwm, spin_ * applied_ / kMostThrottle);
+  add(MotorChannel::drive_pwm, spin_ * applied_ / SpeedLoop::kMost);
   add(MotorChannel::drive_mode, static_cast<double>(applied_ == 0 ? iq::DriveMode::coast : iq::DriveMode::spin_pwm));
   drives_ = wanted_ > 0 && (drives_ || applied_ > 0);
   if (drives_ && applied_ == 0) give_up(at, EventKind::motor_let_go, "its board let it go by itself");
@@ -174,7 +163,7 @@ void EscMotor::spin_at(RadPerSec signed_speed) {
   renewed_ = clock_.now();
   wanted_ = std::abs(signed_speed.value());
   if (wanted_ == 0) return coast(renewed_);
-  if (throttle_ == 0) throttle_ = static_cast<int>(kLeastThrottle);
+  if (throttle_ == 0) throttle_ = static_cast<int>(SpeedLoop::kLeast);
 }
 
 void EscMotor::renew() noexcept {

@@ -13,27 +13,9 @@
 #include "daq/bench/bench.hpp"
 #include "drivers/serial/port.hpp"
 #include "examples/second_bench/checked_lines.hpp"
+#include "examples/second_bench/speed_loop.hpp"
 
 namespace kphi::second_bench {
-
-/// From speed to throttle: what the speed needs at this voltage, and a correction that integrates the error.
-class SpeedLoop {
- public:
-  struct Settings {
-    double pole_pairs = 7;
-    double kv_rad_s_per_v = 0;
-    double proportional = 0, integral = 0;  ///< throttle per rad/s and per rad
-  };
-  explicit SpeedLoop(const Settings& settings) : settings_(settings) {}
-  [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-  /// 48 (the least at which an ESC turns) to 2000. Speeds in rad/s, unsigned.
-  [[nodiscard]] int throttle(double wanted, double measured, double volts, double seconds) noexcept;
-  void reset() noexcept { integral_ = 0; }
-
- private:
-  const Settings settings_;
-  double integral_ = 0;  ///< throttle
-};
 
 class EscMotor final : public daq::MotorLink {
  public:
