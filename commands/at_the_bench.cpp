@@ -1,5 +1,6 @@
 #include "commands/at_the_bench.hpp"
 
+#include <fmt/chrono.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -12,6 +13,11 @@ namespace kphi::commands {
 bool has_terminal() {
   const char* term = std::getenv("TERM");
   return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
+}
+
+std::string stamp_of(const daq::Bench& bench) {
+  const auto began = std::chrono::time_point_cast<std::chrono::seconds>(bench.clock().epoch_utc());
+  return fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(began)));
 }
 
 std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,

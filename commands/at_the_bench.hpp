@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "daq/bench/bench.hpp"
 
@@ -10,6 +11,9 @@ namespace kphi::commands {
 
 /// A live line can be rewritten on stderr.
 [[nodiscard]] bool has_terminal();
+
+/// When the bench began, as names of records begin: "20210530T080000Z".
+[[nodiscard]] std::string stamp_of(const daq::Bench& bench);
 
 /// Refuses a computer that slept while it connected: the answers of the devices are outdated. Throws as connect.
 [[nodiscard]] std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,

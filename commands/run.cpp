@@ -86,10 +86,7 @@ struct Destination {
     if (!finished) (void)require_unchanged(*folder, *resumption, now);
   }
   void create(const RunOptions& options, const profiles::Campaign& campaign, Bench& bench) {
-    const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench.clock().epoch_utc());
-    folder = results::CampaignFolder::create(
-        options.out, fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(started))),
-        campaign.name, bench.files());
+    folder = results::CampaignFolder::create(options.out, stamp_of(bench), campaign.name, bench.files());
     lock.emplace(lock_folder(*folder));
   }
   /// Share of the runs that are still to be made.

@@ -1,6 +1,6 @@
 #include "daq/spin/spin.hpp"
 
-#include <fmt/chrono.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -81,10 +81,8 @@ std::unique_ptr<Operator> person_of(const SpinOptions& options, const std::funct
 }
 
 std::filesystem::path file_of(const SpinOptions& options, const Bench& bench) {
-  const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench.clock().epoch_utc());
   std::filesystem::create_directories(options.out);
-  return std::filesystem::path(options.out) /
-         fmt::format("{:%Y%m%dT%H%M%SZ}_spin.h5", fmt::gmtime(std::chrono::system_clock::to_time_t(started)));
+  return std::filesystem::path(options.out) / (stamp_of(bench) + "_spin.h5");
 }
 
 /// The doubts that are at this speed: once more at the end, since a log scrolls away.

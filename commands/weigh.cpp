@@ -1,6 +1,6 @@
 #include "daq/weigh/weigh.hpp"
 
-#include <fmt/chrono.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <optional>
@@ -56,12 +56,11 @@ void require_somebody(const WeighOptions& options) {
 }
 
 std::filesystem::path keep(const results::Weighing& weighing, const WeighOptions& options, const Bench& bench) {
-  const auto started = std::chrono::time_point_cast<std::chrono::seconds>(bench.clock().epoch_utc());
   std::filesystem::create_directories(options.out);
-  const std::filesystem::path file =
-      std::filesystem::path(options.out) / fmt::format("{:%Y%m%dT%H%M%SZ}{}",
-                                                       fmt::gmtime(std::chrono::system_clock::to_time_t(started)),
-                                                       results::kWeighingEnds);
+  const std::filesystem::path folder = options.out;
+  std::filesystem::path file = folder / (stamp_of(bench) + results::kWeighingEnds);
+  for (int i = 2; std::filesystem::exists(file); ++i)
+    file = folder / fmt::format("{}-{}{}", stamp_of(bench), i, results::kWeighingEnds);
   results::write_text(file, results::format_weighing(weighing));
   return file;
 }

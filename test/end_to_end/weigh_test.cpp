@@ -77,6 +77,14 @@ TEST(Weigh, IsTakenUpByFitForCampaignsOfItsBenchInItsFolder) {
   EXPECT_THAT(given.err, Not(HasSubstr("weighed"))) << "what a person says comes first";
 }
 
+TEST(Weigh, NeverReplacesAnEarlierRecord) {
+  const VirtualCampaign here(short_campaign_text());
+  const auto again = joined(weigh(here.path("bench.yaml"), here.path("out")), {"--yes"});
+  const std::string first = ran(again).out, second = ran(again).out;  // both of the same bench time
+  EXPECT_NE(first, second);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(here.path("out")), {}), 2);
+}
+
 TEST(Weigh, OfAnotherBenchOrCellIsNotTakenUp) {
   const VirtualCampaign here(short_campaign_text("0, 90, 180"), bench_of(1.01));
   (void)ran(joined(weigh(here.path("bench.yaml"), here.path("out")), {"--yes"}));
