@@ -30,6 +30,7 @@ struct UnrefData {
 };
 using Data = std::unique_ptr<UMockdevIoctlData, UnrefData>;
 
+/// None where the program was killed during its call.
 Data resolve(UMockdevIoctlData* data, std::size_t offset, std::size_t bytes) {
   return Data(umockdev_ioctl_data_resolve(data, offset, bytes, nullptr));
 }
@@ -40,8 +41,10 @@ Data resolve(UMockdevIoctlData* data, std::size_t offset, std::size_t bytes) {
   throw std::runtime_error(message);
 }
 
-/// A request of the host that is under way.
+/// A request of the host that is under way. It belongs to whoever opened the device, as in the kernel: a program that
+/// was killed must not leave its requests to the next one.
 struct Urb {
+  Owned<UMockdevIoctlClient> client;
   Data data;    // struct usbdevfs_urb
   Data buffer;  // what it points to
   [[nodiscard]] usbdevfs_urb& operator*() const noexcept { return *reinterpret_cast<usbdevfs_urb*>(data->data); }
@@ -157,11 +160,13 @@ class VirtualUsb::Socket {
       umockdev_ioctl_client_complete(client, result, error);
       return TRUE;
     };
+    const auto mine = [&](const Urb& urb) { return urb.client.get() == client; };
     const bool reaps = request == USBDEVFS_REAPURB || request == USBDEVFS_REAPURBNDELAY;
-    if (gone_ && !(reaps && !urbs_.empty())) return complete(-1, ENODEV);
+    if (gone_ && !(reaps && std::any_of(urbs_.begin(), urbs_.end(), mine))) return complete(-1, ENODEV);
     switch (request) {
       case USBDEVFS_GET_CAPABILITIES: {
         const Data flags = resolve(argument, 0, sizeof(std::uint32_t));
+        if (!flags) return complete(-1, EFAULT);
         const std::uint32_t capabilities =
             USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
         umockdev_ioctl_data_update(flags.get(), 0,
@@ -183,25 +188,26 @@ class VirtualUsb::Socket {
         return complete(0, 0);
       case USBDEVFS_CLEAR_HALT: {
         const Data endpoint = resolve(argument, 0, sizeof(unsigned));
+        if (!endpoint) return complete(-1, EFAULT);
         function_.halt_cleared(endpoint->data[0]);
         return complete(0, 0);
       }
       case USBDEVFS_SUBMITURB:
-        submit(argument);
-        return complete(0, 0);
+        return submit(client, argument) ? complete(0, 0) : complete(-1, EFAULT);
       case USBDEVFS_REAPURB:
       case USBDEVFS_REAPURBNDELAY: {
-        const auto ended = next_ended();
+        const auto ended = next_ended(mine);
         if (ended == urbs_.end()) return complete(-1, EAGAIN);
         const Data pointer = resolve(argument, 0, sizeof(void*));
+        if (!pointer) return complete(-1, EFAULT);
         umockdev_ioctl_data_set_ptr(pointer.get(), 0, ended->data.get());
         urbs_.erase(ended);
         return complete(0, 0);
       }
       case USBDEVFS_DISCARDURB: {
         const gulong address = *reinterpret_cast<gulong*>(argument->data);
-        const auto found =
-            std::find_if(urbs_.begin(), urbs_.end(), [&](const Urb& urb) { return urb.data->client_addr == address; });
+        const auto found = std::find_if(urbs_.begin(), urbs_.end(),
+                                        [&](const Urb& urb) { return mine(urb) && urb.data->client_addr == address; });
         if (found == urbs_.end()) return complete(-1, EINVAL);
         if (!found->ended) end(*found, -ENOENT, 0);
         return complete(0, 0);
@@ -211,21 +217,25 @@ class VirtualUsb::Socket {
     }
   }
 
-  void submit(UMockdevIoctlData* argument) {
+  [[nodiscard]] bool submit(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
     Urb urb;
+    urb.client.reset(UMOCKDEV_IOCTL_CLIENT(g_object_ref(client)));
     urb.data = resolve(argument, 0, sizeof(usbdevfs_urb));
+    if (!urb.data) return false;
     const auto length = static_cast<std::size_t>((*urb).buffer_length);
     if (length > 0) urb.buffer = resolve(urb.data.get(), offsetof(usbdevfs_urb, buffer), length);
     urbs_.push_back(std::move(urb));
     carry_on(urbs_.back());
+    return true;
   }
 
-  std::list<Urb>::iterator next_ended() {
+  template <class Mine>
+  std::list<Urb>::iterator next_ended(const Mine& mine) {
     for (Urb& urb : urbs_) {
-      if (urb.ended) continue;
+      if (urb.ended || !mine(urb)) continue;
       gone_ ? end(urb, -ESHUTDOWN, 0) : carry_on(urb);
     }
-    return std::find_if(urbs_.begin(), urbs_.end(), [](const Urb& urb) { return urb.ended; });
+    return std::find_if(urbs_.begin(), urbs_.end(), [&](const Urb& urb) { return urb.ended && mine(urb); });
   }
 
   void carry_on(Urb& urb) {
