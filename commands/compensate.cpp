@@ -38,7 +38,9 @@ constexpr FlagName kFlagNames[] = {{Flag::thrust_nan, "thrust_nan"},
                                    {Flag::arm_angle_unknown, "arm_angle_unknown"},
                                    {Flag::beyond_fit, "beyond_fit"},
                                    {Flag::at_floor, "at_floor"},
-                                   {Flag::at_ceiling, "at_ceiling"}};
+                                   {Flag::at_ceiling, "at_ceiling"},
+                                   {Flag::arm_angle_beyond, "arm_angle_beyond"},
+                                   {Flag::arm_angle_stale, "arm_angle_stale"}};
 
 using Fields = std::vector<std::string>;
 
@@ -164,7 +166,7 @@ ExitCode verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
     std::cerr << counts.out_of_reach << " of " << counts.written << " rows have an arm angle outside "
               << std::round(to_degrees(vehicle.arm_angle_min)) << " to "
               << std::round(to_degrees(vehicle.arm_angle_max)) << "°, the range of the servos of " << vehicle.path
-              << "; they were computed all the same\n";
+              << "; there φ stays as it was before, as in flight (arm_angle_beyond)\n";
   }
   if (counts.rejected == 0) return ExitCode::ok;
   std::cerr << counts.rejected << " of " << counts.rejected + counts.written << " rows were skipped\n";
@@ -177,16 +179,15 @@ ExitCode compensate(const CompensateRequest& request) {
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
   Compensator compensator = compensator_of(request, vehicle);
   if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
-  const RowCounts counts =
-      compensate_rows(std::cin, std::cout, std::cerr, compensator, {vehicle.arm_angle_min, vehicle.arm_angle_max},
-                      request.json ? RowFormat::json_lines : RowFormat::csv);
+  const RowCounts counts = compensate_rows(std::cin, std::cout, std::cerr, compensator,
+                                           request.json ? RowFormat::json_lines : RowFormat::csv);
   return verdict(counts, vehicle);
 }
 
 }  // namespace
 
 RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
-                          ArmRange reach, RowFormat format) {
+                          RowFormat format) {
   std::string line;
   std::getline(in, line);
   const Fields header = fields_of(line);
@@ -210,9 +211,9 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
       arm_angles[i] = from_degrees(values[i]);
       thrusts[i] = Newtons(values[i + 4]);
     }
-    const auto beyond = [&](Radians angle) { return !(angle >= reach.from && angle <= reach.to); };
-    if (std::ranges::any_of(arm_angles, beyond)) ++counts.out_of_reach;
     compensator.set_arms(arm_angles);
+    const auto beyond = [](Flags flags) { return flags.has(Flag::arm_angle_beyond); };
+    if (std::ranges::any_of(compensator.arm_flags(), beyond)) ++counts.out_of_reach;
     const SpeedCommand command = compensator.speeds_for(thrusts);
     ++counts.written;
     append_row(buffer, format == RowFormat::csv ? kCsv : kJson, compensator, command);

@@ -16,19 +16,13 @@ struct RowCounts {
   std::uint64_t out_of_reach = 0;  ///< of those written: with an arm angle that the servos do not reach
 };
 
-/// What the servos reach.
-struct ArmRange {
-  Radians from;
-  Radians to;
-};
-
 /// Reads CSV with a header naming theta1_deg..theta4_deg and thrust1_n..thrust4_n, in any order; other columns are
 /// ignored. Writes phi1_deg.., k1.., speed1_rpm.., flags as CSV, or one JSON object per line, numbers in shortest round
 /// trip. A flag reads "rotor:what", several are separated by a blank. A row that cannot be used is left out, counted,
-/// and told on `words` with its line number. A row with an arm angle out of `reach` is computed and counted. Output is
-/// handed on whenever no further input waits, so that it can stand in a pipe. Throws ConfigurationError for
-/// a header that does not name all eight columns.
+/// and told on `words` with its line number. A row with an arm angle outside the airframe's limits is flagged and
+/// counted. Output is handed on whenever no further input waits, so that it can stand in a pipe. Throws
+/// ConfigurationError for a header that does not name all eight columns.
 [[nodiscard]] RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words,
-                                        compensation::Compensator& compensator, ArmRange reach, RowFormat format);
+                                        compensation::Compensator& compensator, RowFormat format);
 
 }  // namespace kphi::commands

@@ -1,13 +1,13 @@
-// A morphing quadrotor seen from above: its body, four arms that turn about their hinges, a propeller at the end of
-// each.
+// A morphing multirotor seen from above: its body, three to eight arms that turn about their hinges, a propeller at the
+// end of each.
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <optional>
 
 #include "compensation/convex_polygon.hpp"
+#include "compensation/rotors.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
@@ -22,14 +22,21 @@ struct Hinge {
   bool mirrored = false;
 };
 
-/// A body in general: any convex outline, any four hinges.
+/// A body in general: any convex outline, 3 to 8 hinges anywhere, one for each rotor.
 struct PolygonBody {
   ConvexPolygon outline;
-  std::array<Hinge, 4> hinges;
+  Rotors<Hinge> hinges;
+};
+
+/// What an arm can do, and how well its angle must be known.
+struct ArmLimits {
+  Radians from{-100 * kPi / 180};  ///< an angle below this, or above `to`, is not believed: degrees, or a broken sensor
+  Radians to{190 * kPi / 180};
+  Radians stale{2 * kPi / 180};  ///< how far an arm may have moved since its angle was measured
 };
 
 /// Plain data; Compensator::build says whether it makes sense. The body is the square |x|, |y| <= half_side with an arm
-/// hinged at each corner, unless `polygon` gives another one.
+/// hinged at each corner, a quadrotor, unless `polygon` gives another one.
 struct Airframe {
   Metres half_side;
   Metres arm_length;  ///< hinge to hub; longer than the propeller radius
@@ -40,29 +47,27 @@ struct Airframe {
   std::array<bool, 4> mirrored{};                ///< arms that fold the other way round: θ counts clockwise
   OverlapMeasure overlap = OverlapMeasure::rim_arc;  ///< how φ is measured; the curves must be fitted with the same
   std::optional<PolygonBody> polygon =
-      std::nullopt;  ///< instead of the square: half_side, hinge_turns and mirrored do not count then
+      std::nullopt;                  ///< instead of the square: half_side, hinge_turns and mirrored do not count then
+  Rotors<Metres> propeller_radii{};  ///< instead of propeller_radius, where the propellers differ
+  ArmLimits arms{};
 };
+
+[[nodiscard]] inline std::size_t rotors_of(const Airframe& airframe) noexcept {
+  return airframe.polygon ? airframe.polygon->hinges.size() : 4;
+}
+
+[[nodiscard]] inline Metres radius_of(const Airframe& airframe, std::size_t rotor) noexcept {
+  return airframe.propeller_radii.size() == 0 ? airframe.propeller_radius : airframe.propeller_radii[rotor];
+}
 
 /// Hub on a square body, in the frame turned (and mirrored) with the hinge. The square looks alike from each corner, so
 /// this frame serves all four arms. θ = 45° points away from the body (X), 180° along the next edge (O).
-[[nodiscard]] inline HubPosition hub_seen_from_hinge(const Airframe& airframe, Radians arm_angle) noexcept {
-  return {airframe.half_side + airframe.arm_length * std::cos(arm_angle.value()),
-          airframe.half_side + airframe.arm_length * std::sin(arm_angle.value())};
-}
+[[nodiscard]] HubPosition hub_seen_from_hinge(const Airframe& airframe, Radians arm_angle) noexcept;
 
 /// Hub of an arm on a body that is no square, in the body frame.
-[[nodiscard]] inline HubPosition hub_at_hinge(const Hinge& hinge, Metres arm_length, Radians arm_angle) noexcept {
-  const double direction = (hinge.mirrored ? hinge.turn - arm_angle : hinge.turn + arm_angle).value();
-  return {hinge.at.x + arm_length * std::cos(direction), hinge.at.y + arm_length * std::sin(direction)};
-}
+[[nodiscard]] HubPosition hub_at_hinge(const Hinge& hinge, Metres arm_length, Radians arm_angle) noexcept;
 
-/// Hub of arm 0..3 in the body frame: c_i = Rot(90° turn_i) (a + L cos θ_i, a + L sin θ_i) on the square.
-[[nodiscard]] inline HubPosition hub_in_body(const Airframe& airframe, std::size_t arm, Radians arm_angle) noexcept {
-  if (airframe.polygon) return hub_at_hinge(airframe.polygon->hinges[arm], airframe.arm_length, arm_angle);
-  HubPosition hub = hub_seen_from_hinge(airframe, arm_angle);
-  if (airframe.mirrored[arm]) hub = {hub.y, hub.x};
-  for (int turns = airframe.hinge_turns[arm] & 3; turns > 0; --turns) hub = {-hub.y, hub.x};
-  return hub;
-}
+/// Hub of an arm in the body frame: c_i = Rot(90° turn_i) (a + L cos θ_i, a + L sin θ_i) on the square.
+[[nodiscard]] HubPosition hub_in_body(const Airframe& airframe, std::size_t arm, Radians arm_angle) noexcept;
 
 }  // namespace kphi::compensation

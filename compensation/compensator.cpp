@@ -7,7 +7,11 @@
 namespace kphi::compensation {
 namespace {
 
-bool positive(double value) noexcept { return std::isfinite(value) && value > 0.0; }
+/// Shares that are only rounding: of a curve in its file, of a thrust that is just what a rotor can give.
+constexpr Real kRounding = sizeof(Real) == sizeof(double) ? Real(1e-9) : Real(1e-6);
+constexpr Real kUnknownAngle = std::numeric_limits<Real>::quiet_NaN();
+
+bool positive(Real value) noexcept { return std::isfinite(value) && value > 0; }
 
 bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   unsigned seen = 0;
@@ -28,36 +32,41 @@ Refusal refusal_of_body(const Airframe& airframe) noexcept {
   return std::all_of(hinges.begin(), hinges.end(), finite) ? Refusal::none : Refusal::hinges;
 }
 
-Refusal refusal_of(const Airframe& airframe) noexcept {
-  if ((!airframe.polygon && !positive(airframe.half_side.value())) || !positive(airframe.arm_length.value()) ||
-      !positive(airframe.propeller_radius.value())) {
+Refusal refusal_of(const Airframe& airframe, std::size_t curves) noexcept {
+  const std::size_t rotors = rotors_of(airframe), radii = airframe.propeller_radii.size();
+  if (rotors < kFewestRotors || curves != rotors || (radii != 0 && radii != rotors)) return Refusal::rotors;
+  if ((!airframe.polygon && !positive(airframe.half_side.value())) || !positive(airframe.arm_length.value())) {
     return Refusal::sizes;
   }
-  if (airframe.arm_length <= airframe.propeller_radius) return Refusal::arm_length;
-  const double slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
-  if (!(slowest >= 0.0) || !(fastest > slowest) || !std::isfinite(fastest)) return Refusal::speeds;
+  for (std::size_t i = 0; i < rotors; ++i) {
+    if (!positive(radius_of(airframe, i).value())) return Refusal::sizes;
+    if (airframe.arm_length <= radius_of(airframe, i)) return Refusal::arm_length;
+  }
+  const Real slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
+  if (!(slowest >= 0) || !(fastest > slowest) || !std::isfinite(fastest)) return Refusal::speeds;
+  if (!(airframe.arms.from < airframe.arms.to) || !(airframe.arms.stale.value() > 0)) return Refusal::arm_limits;
   return refusal_of_body(airframe);
 }
 
 /// The window is known in closed form for the square alone.
-ContactFreeWindow window_of(const Airframe& airframe) noexcept {
-  if (airframe.polygon) return {Radians(1.0), Radians(-1.0)};
-  return contact_free_window(airframe.half_side, airframe.arm_length, airframe.propeller_radius);
+ContactFreeWindow window_of(const Airframe& airframe, std::size_t rotor) noexcept {
+  if (airframe.polygon) return {Radians(1), Radians(-1)};
+  return contact_free_window(airframe.half_side, airframe.arm_length, radius_of(airframe, rotor));
 }
 
-/// As a number that is added: the compiler makes vector instructions of it.
-constexpr double worth(Flag flag) noexcept { return static_cast<double>(flag); }
-
-CurveDoubts doubts_about(const ThrustCurve& curve, ScalingLaw law) noexcept {
-  CurveDoubts doubts;
-  doubts.gains_with_occlusion = curve.at(curve.largest_fitted()) >= curve.at(Radians(0.0));
-  // A curve forced through K_T may miss it by the rounding of its file.
-  const double offset = curve.at(Radians(0.0)) / curve.thrust_coefficient() - 1.0;
-  doubts.steps_at_contact = offset < -1e-9 || (law == ScalingLaw::published && offset > 1e-9);
-  return doubts;
+Real thrust_of(const Rotors<Newtons>& thrusts, std::size_t rotor) noexcept {
+  return rotor < thrusts.size() ? thrusts[rotor].value() : Real(0);
 }
 
 }  // namespace
+
+CurveDoubts doubts_about(const ThrustCurve& curve, ScalingLaw law) noexcept {
+  CurveDoubts doubts;
+  doubts.gains_with_occlusion = curve.at(curve.largest_fitted()) >= curve.at(Radians(0));
+  const Real offset = curve.at(Radians(0)) / curve.thrust_coefficient() - 1;
+  doubts.steps_at_contact = offset < -kRounding || (law == ScalingLaw::published && offset > kRounding);
+  return doubts;
+}
 
 const char* describe(Refusal refusal) noexcept {
   static constexpr const char* kSentences[] = {
@@ -69,148 +78,161 @@ const char* describe(Refusal refusal) noexcept {
       "each arm needs a corner of its own; give the hinge turns 0, 1, 2, 3 (times 90 degrees) in some order",
       "a hinge of the polygon body is not finite; check its place [m] and turn [rad]",
       "a curve was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
-      "or fit again"};
-  return refusal <= Refusal::overlap ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
+      "or fit again",
+      "a vehicle has 3 to 8 rotors, with a curve and a hinge for each; count them",
+      "arm limits must satisfy from < to, and stale > 0; check them [rad]"};
+  return refusal <= Refusal::arm_limits ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
 }
 
-BuildOutcome Compensator::build(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe,
-                                ScalingLaw law) noexcept {
+BuildOutcome Compensator::build(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept {
   BuildOutcome outcome;
-  outcome.refusal = refusal_of(airframe);
+  outcome.refusal = refusal_of(airframe, curves.size());
   for (const ThrustCurve& curve : curves) {
     if (outcome.refusal == Refusal::none && curve.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
   }
   if (outcome.refusal != Refusal::none) return outcome;
+  outcome.doubts = Rotors<CurveDoubts>(curves.size());
   for (std::size_t i = 0; i < curves.size(); ++i) outcome.doubts[i] = doubts_about(curves[i], law);
   outcome.compensator = Compensator(curves, airframe, law);
   return outcome;
 }
 
-Compensator::Compensator(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe, ScalingLaw law) noexcept
-    : slowest_(airframe.slowest_speed.value()),
+Compensator::Compensator(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept
+    : effective_coefficients_(curves.size()),
+      slowest_(airframe.slowest_speed.value()),
       fastest_(airframe.fastest_speed.value()),
+      arm_flags_(curves.size()),
       law_(law),
+      arm_angles_(curves.size(), Radians(kUnknownAngle)),  // differs from every first angle
+      occlusion_angles_(curves.size()),
+      scaling_factors_(curves.size()),
+      thrust_max_(curves.size()),
+      drag_scale_(curves.size()),
       curves_(curves),
       airframe_(airframe),
-      contact_free_(window_of(airframe)) {
-  arm_angles_.fill(Radians(std::numeric_limits<double>::quiet_NaN()));  // differs from every first angle
-  for (std::size_t i = 0; i < curves_.size(); ++i) apply_occlusion(i);
+      contact_free_(curves.size()) {
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    contact_free_[i] = window_of(airframe, i);
+    apply_occlusion(i);
+  }
 }
 
 Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
-  if (angle == arm_angles_[i] && !arm_flags_[i].has(Flag::arm_angle_unknown)) return Arm::at_rest;
-  if (!std::isfinite(angle.value())) {
-    arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, true);
-    return Arm::at_rest;
-  }
+  const bool unknown = !std::isfinite(angle.value());
+  const bool beyond = !unknown && (angle < airframe_.arms.from || angle > airframe_.arms.to);
+  arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, unknown).with(Flag::arm_angle_beyond, beyond);
+  if (unknown || beyond || angle == arm_angles_[i]) return Arm::at_rest;
   arm_angles_[i] = angle;
-  arm_flags_[i] = Flags();
-  if (!contact_free_.contains(angle)) return Arm::near_body;
-  return occlusion_angles_[i].value() == 0.0 ? Arm::at_rest : Arm::left_body;
+  if (!contact_free_[i].contains(angle)) return Arm::near_body;
+  return occlusion_angles_[i].value() > 0 ? Arm::left_body : Arm::at_rest;
 }
 
-void Compensator::set_arms(const std::array<Radians, 4>& arm_angles) noexcept {
+void Compensator::set_arms(const Rotors<Radians>& arm_angles, const ArmMotion& motion) noexcept {
   // In passes over all arms: the long calls of one pass do not wait for each other.
-  std::array<Arm, 4> arms{};
+  Arm arms[kMostRotors];
   bool all_at_rest = true;
-  for (std::size_t i = 0; i < 4; ++i) {
-    arms[i] = take(i, arm_angles[i]);
+  const Real age = motion.age.value();
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    arms[i] = take(i, i < arm_angles.size() ? arm_angles[i] : Radians(kUnknownAngle));
     all_at_rest = all_at_rest && arms[i] == Arm::at_rest;
+    const Real rate = i < motion.rates.size() ? motion.rates[i].value() : Real(0);
+    const bool fresh = std::fabs(rate) * age <= airframe_.arms.stale.value();
+    arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_stale, !fresh);
   }
   if (all_at_rest) return;
-  std::array<HubPosition, 4> hubs{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (arms[i] == Arm::near_body) hubs[i] = hub_beside_body(airframe_, i, arm_angles[i]);
+  HubPosition hubs[kMostRotors];
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    if (arms[i] == Arm::near_body) hubs[i] = hub_beside_body(airframe_, i, arm_angles_[i]);
   }
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (arms[i] == Arm::near_body) occlusion_angles_[i] = occlusion_beside_body(airframe_, hubs[i]);
-    if (arms[i] == Arm::left_body) occlusion_angles_[i] = Radians(0.0);
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    if (arms[i] == Arm::near_body) occlusion_angles_[i] = occlusion_beside_body(airframe_, i, hubs[i]);
+    if (arms[i] == Arm::left_body) occlusion_angles_[i] = Radians(0);
   }
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < rotors(); ++i) {
     if (arms[i] != Arm::at_rest) apply_occlusion(i);
   }
 }
 
 void Compensator::enable(bool on) noexcept {
   enabled_ = on;
-  for (std::size_t i = 0; i < curves_.size(); ++i) apply_occlusion(i);
+  for (std::size_t i = 0; i < rotors(); ++i) apply_occlusion(i);
 }
 
 void Compensator::apply_occlusion(std::size_t rotor) noexcept {
   const ThrustCurve& curve = curves_[rotor];
   const Radians phi = occlusion_angles_[rotor];
-  const bool covered = enabled_ && phi.value() > 0.0;
-  const double scaling = covered ? curve.scaling_factor(phi, law_) : 1.0;
+  const bool covered = enabled_ && phi.value() > 0;
+  const Real scaling = covered ? curve.scaling_factor(phi, law_) : Real(1);
   // The published law reaches 0 and below: divide by next to nothing then, and the fastest speed holds.
-  const double effective = std::max(curve.thrust_coefficient().value() * scaling, std::numeric_limits<double>::min());
+  const Real effective = std::max(curve.thrust_coefficient().value() * scaling, std::numeric_limits<Real>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
   thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_));
-  drag_scale_[rotor] = 1.0 / std::max(scaling, kScalingFloor);
+  drag_scale_[rotor] = 1 / std::max(scaling, kScalingFloor);
   arm_flags_[rotor] =
-      Flags()
-          .with(Flag::arm_angle_unknown, arm_flags_[rotor].has(Flag::arm_angle_unknown))
+      arm_flags_[rotor]
           .with(Flag::beyond_fit, phi > curve.largest_fitted())
           .with(Flag::at_floor, scaling <= kScalingFloor)
           .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && curve.at(phi) > curve.thrust_coefficient());
 }
 
-SpeedCommand Compensator::speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept {
+SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexcept {
   // In passes over all rotors: the compiler makes vector instructions of them. Flags are for what was changed alone.
-  double possible[4], wanted[4], held[4], change[4];
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double asked = thrusts[i].value();
-    possible[i] = asked > 0.0 ? asked : 0.0;  // NaN compares false
-    wanted[i] = std::sqrt(possible[i] / effective_coefficients_[i]);
+  Real wanted[kMostRotors], changed = 0;
+  const std::size_t count = rotors();
+  SpeedCommand command{Rotors<RadPerSec>(count), arm_flags_};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);  // NaN compares false
+    wanted[i] = std::sqrt(possible / effective_coefficients_[i]);
+    const Real raised = wanted[i] < slowest_ ? slowest_ : wanted[i], held = raised > fastest_ ? fastest_ : raised;
+    changed += std::fabs(held - wanted[i]) + std::fabs(possible - asked);
+    command.speeds[i] = RadPerSec(held);
   }
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double raised = wanted[i] < slowest_ ? slowest_ : wanted[i];
-    held[i] = raised > fastest_ ? fastest_ : raised;
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    change[i] = std::fabs(held[i] - wanted[i]) + std::fabs(possible[i] - thrusts[i].value());
-  }
-  SpeedCommand command;
-  for (std::size_t i = 0; i < 4; ++i) command.speeds[i] = RadPerSec(held[i]);
-  command.flags = arm_flags_;
-  const bool as_asked = change[0] + change[1] + (change[2] + change[3]) == 0.0;  // NaN compares false
-  if (!as_asked) flag(thrusts, wanted, command.flags);
+  if (!(changed <= 0)) flag(thrusts, wanted, command.flags);
   return command;
 }
 
-void Compensator::flag(const std::array<Newtons, 4>& thrusts, const double (&wanted)[4],
-                       std::array<Flags, 4>& flags) const noexcept {
-  double raised[4];
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double asked = thrusts[i].value();
-    raised[i] = (asked != asked ? worth(Flag::thrust_nan) : 0.0) + (asked < 0.0 ? worth(Flag::thrust_negative) : 0.0) +
-                (wanted[i] < slowest_ ? worth(Flag::speed_at_slowest) : 0.0) +
-                (wanted[i] > fastest_ ? worth(Flag::speed_at_fastest) : 0.0);
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    flags[i] = flags[i].with(static_cast<std::uint8_t>(static_cast<int>(raised[i])));
+void Compensator::flag(const Rotors<Newtons>& thrusts, const Real (&wanted)[kMostRotors],
+                       Rotors<Flags>& flags) const noexcept {
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const Real asked = thrust_of(thrusts, i);
+    flags[i] = flags[i]
+                   .with(Flag::thrust_nan, std::isnan(asked))
+                   .with(Flag::thrust_negative, asked < 0)
+                   .with(Flag::speed_at_slowest, wanted[i] < slowest_ * (1 - kRounding))
+                   .with(Flag::speed_at_fastest, wanted[i] > fastest_ * (1 + kRounding));
   }
 }
 
-std::array<RadPerSec, 4> Compensator::speed_uncertainties(const std::array<Newtons, 4>& thrusts,
-                                                          Radians arm_angle_uncertainty) const noexcept {
+Rotors<Newtons> Compensator::uncovered_thrusts(const Rotors<Newtons>& thrusts) const noexcept {
+  Rotors<Newtons> uncovered(rotors());
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);
+    const Real coefficient = curves_[i].thrust_coefficient().value();
+    uncovered[i] =
+        Newtons(std::min(possible * (coefficient / effective_coefficients_[i]), coefficient * (fastest_ * fastest_)));
+  }
+  return uncovered;
+}
+
+Rotors<RadPerSec> Compensator::speed_uncertainties(const Rotors<Newtons>& thrusts,
+                                                   Radians arm_angle_uncertainty) const noexcept {
+  constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
   const SpeedCommand command = speeds_for(thrusts);
-  std::array<RadPerSec, 4> uncertainties;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Radians angle = arm_angles_[i], phi = enabled_ ? occlusion_angles_[i] : Radians(0.0);
-    const bool known = !arm_flags_[i].has(Flag::arm_angle_unknown) && std::isfinite(arm_angle_uncertainty.value());
-    Radians spread(0.0);
-    if (enabled_ && known && std::isfinite(angle.value()) && arm_angle_uncertainty.value() != 0.0) {
+  Rotors<RadPerSec> uncertainties(rotors(), RadPerSec(kUnknown));
+  if (!std::isfinite(arm_angle_uncertainty.value())) return uncertainties;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const Radians angle = arm_angles_[i], phi = enabled_ ? occlusion_angles_[i] : Radians(0);
+    if (arm_flags_[i].has(Flag::arm_angle_unknown) || arm_flags_[i].has(Flag::arm_angle_beyond)) continue;
+    Radians spread(0);
+    if (enabled_ && std::isfinite(angle.value())) {
       const Radians above = occlusion_of_arm(airframe_, i, angle + arm_angle_uncertainty);
       const Radians below = occlusion_of_arm(airframe_, i, angle - arm_angle_uncertainty);
-      spread = Radians(0.5 * std::fabs((above - below).value()));
+      spread = Radians(std::fabs((above - below).value()) / 2);
     }
-    const double relative =
-        curves_[i].relative_uncertainty(phi, spread, phi.value() > 0.0 ? law_ : ScalingLaw::clamped);
-    const double unknown = std::numeric_limits<double>::infinity();
-    const double speed = command.speeds[i].value();
+    const Real relative = curves_[i].relative_uncertainty(phi, spread, phi.value() > 0 ? law_ : ScalingLaw::clamped);
     // Zero times infinity would be NaN.
-    uncertainties[i] = RadPerSec(known && relative < unknown ? 0.5 * relative * speed : unknown);
+    if (relative < kUnknown) uncertainties[i] = RadPerSec(relative / 2 * command.speeds[i].value());
   }
   return uncertainties;
 }

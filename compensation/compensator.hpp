@@ -1,8 +1,8 @@
 // From the thrust a controller wants of each rotor to the speed that gives it, although the body covers part of the
 // disk (paper, section "Geometry-Aware Compensation Scheme"). Stands after mixing and saturation.
 //
-// Real-time: no call allocates, throws, locks or loops beyond the four arms. Not synchronised: call from one thread, or
-// copy the Compensator (trivially copyable) between threads.
+// Real-time: no call allocates, throws, locks or loops beyond the eight arms. Not synchronised: call from one thread,
+// or copy the Compensator (trivially copyable) between threads.
 #pragma once
 
 #include <array>
@@ -12,8 +12,10 @@
 #include <type_traits>
 
 #include "compensation/airframe.hpp"
+#include "compensation/balance.hpp"
 #include "compensation/flag_set.hpp"
 #include "compensation/occlusion.hpp"
+#include "compensation/rotors.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "compensation/units.hpp"
 
@@ -21,7 +23,7 @@ namespace kphi::compensation {
 
 /// What had to be done to one rotor's command. None of them is an error; each says the number is not the plain
 /// formula's.
-enum class Flag : std::uint8_t {
+enum class Flag : std::uint16_t {
   thrust_nan = 1,          ///< the thrust asked for was NaN and counted as 0
   thrust_negative = 2,     ///< the thrust asked for was negative and counted as 0
   speed_at_slowest = 4,    ///< raised to the slowest speed
@@ -30,14 +32,22 @@ enum class Flag : std::uint8_t {
   beyond_fit = 32,         ///< φ is larger than the largest fitted occlusion: the curve is a guess there
   at_floor = 64,           ///< k_i is at kScalingFloor or (published law) below
   at_ceiling = 128,        ///< covered, yet the curve lies above K_T there: k_i is held at 1 (clamped law)
+  arm_angle_beyond = 256,  ///< the last arm angle was outside the arm's limits: the occlusion before it is kept
+  arm_angle_stale = 512,   ///< the arm has moved by more than ArmLimits::stale since its angle was measured
 };
 
 /// One rotor's.
 using Flags = FlagSet<Flag>;
 
 struct SpeedCommand {
-  std::array<RadPerSec, 4> speeds;  ///< rad/s, never NaN, within the airframe's speed limits
-  std::array<Flags, 4> flags;
+  Rotors<RadPerSec> speeds;  ///< rad/s, never NaN, within the airframe's speed limits
+  Rotors<Flags> flags;
+};
+
+/// How the arms moved when their angles were measured, and how long ago that was.
+struct ArmMotion {
+  Seconds age{0};             ///< not negative; NaN counts as for ever
+  Rotors<RadPerSec> rates{};  ///< of each arm; missing ones count as 0
 };
 
 /// Why Compensator::build refused.
@@ -49,6 +59,8 @@ enum class Refusal : std::uint8_t {
   hinge_turns,  ///< each arm has a corner of its own: 0, 1, 2, 3 in any order
   hinges,       ///< hinges of a polygon body must be finite
   overlap,      ///< every curve must be fitted with the overlap measure that the airframe flies with
+  rotors,       ///< as many curves as arms, 3 to 8; propeller radii for all of them or none
+  arm_limits,   ///< from < to, stale above 0
 };
 
 /// One sentence, with the next move.
@@ -59,22 +71,27 @@ struct BuildOutcome;
 class Compensator {
  public:
   /// The only place that refuses. `curves` and `airframe` in the order of the rotors.
-  [[nodiscard]] static BuildOutcome build(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe,
+  [[nodiscard]] static BuildOutcome build(const Rotors<ThrustCurve>& curves, const Airframe& airframe,
                                           ScalingLaw law = ScalingLaw::clamped) noexcept;
 
-  /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite keeps the last φ.
-  /// Before the first call no propeller is taken to be covered.
-  void set_arms(const std::array<Radians, 4>& arm_angles) noexcept;
+  /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite, or outside the arm's
+  /// limits, keeps the last φ. With `motion` an arm that may have gone on moving by more than ArmLimits::stale is
+  /// flagged. Before the first call no propeller is taken to be covered.
+  void set_arms(const Rotors<Radians>& arm_angles, const ArmMotion& motion = {}) noexcept;
 
   /// At control rate. ω = sqrt(max(T, 0) / (K_T k_i)) (equation 4), held between slowest and fastest; never NaN.
-  /// Where nothing is covered this is sqrt(T / K_T) bit for bit.
-  [[nodiscard]] SpeedCommand speeds_for(const std::array<Newtons, 4>& thrusts) const noexcept;
+  /// Where nothing is covered this is sqrt(T / K_T) bit for bit. Missing thrusts count as 0.
+  [[nodiscard]] SpeedCommand speeds_for(const Rotors<Newtons>& thrusts) const noexcept;
+
+  /// The way in without a speed loop: the thrusts T/k_i [N] that a map of the uncovered propeller, such as the flight
+  /// stack's own thrust curve or ThrottleCurve, must be asked for, held within [0, K_T ω_fastest²]. NaN counts as 0.
+  [[nodiscard]] Rotors<Newtons> uncovered_thrusts(const Rotors<Newtons>& thrusts) const noexcept;
 
   /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from the curves' own and
   /// that of the arm angles [rad], which moves φ. +∞ where none can be given: the curve carries
   /// none, k_i is at its floor, the arm angle is not known. Costs up to eight times a set_arms: for logs and planning.
-  [[nodiscard]] std::array<RadPerSec, 4> speed_uncertainties(
-      const std::array<Newtons, 4>& thrusts, Radians arm_angle_uncertainty = Radians(0.0)) const noexcept;
+  [[nodiscard]] Rotors<RadPerSec> speed_uncertainties(const Rotors<Newtons>& thrusts,
+                                                      Radians arm_angle_uncertainty = Radians(0)) const noexcept;
 
   /// Compensated or not. When off every k_i is 1 and speeds_for is the plain map bit for bit; φ is followed all the
   /// same.
@@ -82,41 +99,46 @@ class Compensator {
   /// Whether it compensates; it does from the beginning.
   [[nodiscard]] bool enabled() const noexcept { return enabled_; }
 
+  /// 3 to 8.
+  [[nodiscard]] std::size_t rotors() const noexcept { return curves_.size(); }
   /// φ of each rotor [rad], in [0, 2π].
-  [[nodiscard]] const std::array<Radians, 4>& occlusion_angles() const noexcept { return occlusion_angles_; }
+  [[nodiscard]] const Rotors<Radians>& occlusion_angles() const noexcept { return occlusion_angles_; }
   /// k_i.
-  [[nodiscard]] const std::array<double, 4>& scaling_factors() const noexcept { return scaling_factors_; }
+  [[nodiscard]] const Rotors<Real>& scaling_factors() const noexcept { return scaling_factors_; }
   /// K_T k_i ω_fastest²: what each rotor can give now, for the saturation before this map.
-  [[nodiscard]] const std::array<Newtons, 4>& thrust_max() const noexcept { return thrust_max_; }
+  [[nodiscard]] const Rotors<Newtons>& thrust_max() const noexcept { return thrust_max_; }
   /// 1/k_i: torque follows ω², so torque per thrust grows by this; for the allocation. At most 1/kScalingFloor.
-  [[nodiscard]] const std::array<double, 4>& drag_scale() const noexcept { return drag_scale_; }
+  [[nodiscard]] const Rotors<Real>& drag_scale() const noexcept { return drag_scale_; }
+  /// Of the shape that the last set_arms told, for Mixer::set_layout, which refuses it where no angle is known yet.
+  [[nodiscard]] RotorLayout layout(const Masses& masses, const Rotors<int>& spins) const noexcept {
+    return layout_of(airframe_, masses, arm_angles_, spins);
+  }
   /// What the last set_arms found; speeds_for repeats it in its flags.
-  [[nodiscard]] const std::array<Flags, 4>& arm_flags() const noexcept { return arm_flags_; }
+  [[nodiscard]] const Rotors<Flags>& arm_flags() const noexcept { return arm_flags_; }
 
  private:
-  Compensator(const std::array<ThrustCurve, 4>& curves, const Airframe& airframe, ScalingLaw law) noexcept;
+  Compensator(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept;
   /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
   /// Adds what was done to these thrusts and to the speeds that they want.
-  void flag(const std::array<Newtons, 4>& thrusts, const double (&wanted)[4],
-            std::array<Flags, 4>& flags) const noexcept;
+  void flag(const Rotors<Newtons>& thrusts, const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
 
-  std::array<double, 4> effective_coefficients_{};  // K_T k_i, positive: what speeds_for divides by
-  double slowest_;
-  double fastest_;
-  std::array<Flags, 4> arm_flags_{};
+  Rotors<Real> effective_coefficients_;  // K_T k_i, positive: what speeds_for divides by
+  Real slowest_;
+  Real fastest_;
+  Rotors<Flags> arm_flags_;
   bool enabled_ = true;
   ScalingLaw law_;
-  std::array<Radians, 4> arm_angles_;
-  std::array<Radians, 4> occlusion_angles_{};
-  std::array<double, 4> scaling_factors_{};
-  std::array<Newtons, 4> thrust_max_{};
-  std::array<double, 4> drag_scale_{};
-  std::array<ThrustCurve, 4> curves_;
+  Rotors<Radians> arm_angles_;
+  Rotors<Radians> occlusion_angles_;
+  Rotors<Real> scaling_factors_;
+  Rotors<Newtons> thrust_max_;
+  Rotors<Real> drag_scale_;
+  Rotors<ThrustCurve> curves_;
   Airframe airframe_;
-  ContactFreeWindow contact_free_;
+  Rotors<ContactFreeWindow> contact_free_;
 };
 
 static_assert(std::is_trivially_copyable<Compensator>::value, "a Compensator is copied between threads as bytes");
@@ -127,10 +149,12 @@ struct CurveDoubts {
   bool steps_at_contact = false;      ///< k_i jumps at first contact: k(0) below K_T, or not equal (published law)
 };
 
+[[nodiscard]] CurveDoubts doubts_about(const ThrustCurve& curve, ScalingLaw law) noexcept;
+
 struct BuildOutcome {
   std::optional<Compensator> compensator;  ///< there unless refused
   Refusal refusal = Refusal::none;
-  std::array<CurveDoubts, 4> doubts{};
+  Rotors<CurveDoubts> doubts;
 };
 
 }  // namespace kphi::compensation

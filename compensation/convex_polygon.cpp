@@ -6,40 +6,43 @@
 namespace kphi::compensation {
 namespace {
 
+/// Where three corners count as on one line [rad].
+constexpr Real kStraight = sizeof(Real) == sizeof(double) ? Real(1e-9) : Real(1e-5);
+
 /// A directed edge in units of the radius, the hub at the origin: points at `offset` to its right, `along` from the
 /// foot.
 struct Edge {
-  double offset;  ///< distance of the line from the hub, positive when the hub lies on the body's side
-  double from;
-  double to;
+  Real offset;  ///< distance of the line from the hub, positive when the hub lies on the body's side
+  Real from;
+  Real to;
 };
 
-double turn(const Position& a, const Position& b, const Position& c) noexcept {
+Real turn(const Position& a, const Position& b, const Position& c) noexcept {
   return (b.x - a.x).value() * (c.y - b.y).value() - (b.y - a.y).value() * (c.x - b.x).value();
 }
 
-Edge edge_between(const Position& a, const Position& b, const Position& hub, double radius) noexcept {
-  const double ax = (a.x - hub.x).value() / radius, ay = (a.y - hub.y).value() / radius;
-  const double dx = (b.x - a.x).value() / radius, dy = (b.y - a.y).value() / radius;
-  const double length = std::hypot(dx, dy), ex = dx / length, ey = dy / length;
-  const double from = ax * ex + ay * ey;
+Edge edge_between(const Position& a, const Position& b, const Position& hub, Real radius) noexcept {
+  const Real ax = (a.x - hub.x).value() / radius, ay = (a.y - hub.y).value() / radius;
+  const Real dx = (b.x - a.x).value() / radius, dy = (b.y - a.y).value() / radius;
+  const Real length = std::hypot(dx, dy), ex = dx / length, ey = dy / length;
+  const Real from = ax * ex + ay * ey;
   return {ax * ey - ay * ex, from, from + length};
 }
 
 /// The angle under which the hub sees the stretch of the edge, positive counter-clockwise.
-double subtended(double offset, double from, double to) noexcept {
+Real subtended(Real offset, Real from, Real to) noexcept {
   return std::atan2(offset * (to - from), offset * offset + from * to);
 }
 
 /// ∮ of the measure's potential along a stretch inside the disk; a whole turn of the rim counts 2π.
-double inside_the_disk(double offset, double from, double to, OverlapMeasure measure) noexcept {
-  if (measure == OverlapMeasure::rim_arc) return 0.0;
+Real inside_the_disk(Real offset, Real from, Real to, OverlapMeasure measure) noexcept {
+  if (measure == OverlapMeasure::rim_arc) return 0;
   if (measure == OverlapMeasure::area_share) return offset * (to - from);
   // ∫ r³ dα = offset ∫ r dl, r² = offset² + l².
-  const auto antiderivative = [offset](double along) {
-    const double distance = std::hypot(offset, along);
-    const double logarithm = offset == 0.0 ? 0.0 : offset * offset * std::asinh(along / std::fabs(offset));
-    return 0.5 * (along * distance + logarithm);
+  const auto antiderivative = [offset](Real along) {
+    const Real distance = std::hypot(offset, along);
+    const Real logarithm = std::fabs(offset) > 0 ? offset * offset * std::asinh(along / std::fabs(offset)) : Real(0);
+    return (along * distance + logarithm) / 2;
   };
   return offset * (antiderivative(to) - antiderivative(from));
 }
@@ -50,15 +53,15 @@ std::optional<ConvexPolygon> ConvexPolygon::from(const Position* corners, std::s
   if (corners == nullptr || count < 3 || count > kMaxCorners) return std::nullopt;
   ConvexPolygon polygon;
   polygon.size_ = count;
-  double turned = 0.0;
+  Real turned = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Position &here = corners[i], &next = corners[(i + 1) % count], &after = corners[(i + 2) % count];
     if (!std::isfinite(here.x.value()) || !std::isfinite(here.y.value())) return std::nullopt;
-    const double cross = turn(here, next, after);
-    const double along =
+    const Real cross = turn(here, next, after);
+    const Real along =
         (next.x - here.x).value() * (after.x - next.x).value() + (next.y - here.y).value() * (after.y - next.y).value();
-    const double angle = std::atan2(cross, along);
-    if (!(cross > 0.0) || !(angle > 1e-9)) return std::nullopt;
+    const Real angle = std::atan2(cross, along);
+    if (!(cross > 0) || !(angle > kStraight)) return std::nullopt;
     turned += angle;
     polygon.corners_[i] = here;
   }
@@ -78,14 +81,14 @@ ConvexPolygon ConvexPolygon::square(Metres half_side) noexcept {
 }
 
 Radians occlusion_angle(const ConvexPolygon& body, Metres radius, Position hub, OverlapMeasure measure) noexcept {
-  if (!(radius.value() > 0.0)) return Radians(0.0);
-  double sum = 0.0;
+  if (!(radius.value() > 0)) return Radians(0);
+  Real sum = 0;
   bool apart = true, hub_inside = true;
   for (std::size_t i = 0; i < body.size(); ++i) {
     const Edge edge = edge_between(body.corner(i), body.corner((i + 1) % body.size()), hub, radius.value());
-    hub_inside = hub_inside && edge.offset > 0.0;
-    const double chord = std::sqrt(std::max(0.0, (1.0 - edge.offset) * (1.0 + edge.offset)));
-    const double enters = std::max(edge.from, -chord), leaves = std::min(edge.to, chord);
+    hub_inside = hub_inside && edge.offset > 0;
+    const Real chord = std::sqrt(std::max(Real(0), (1 - edge.offset) * (1 + edge.offset)));
+    const Real enters = std::max(edge.from, -chord), leaves = std::min(edge.to, chord);
     if (!(enters < leaves)) {
       sum += subtended(edge.offset, edge.from, edge.to);
       continue;
@@ -95,8 +98,8 @@ Radians occlusion_angle(const ConvexPolygon& body, Metres radius, Position hub, 
     if (edge.from < enters) sum += subtended(edge.offset, edge.from, enters);
     if (leaves < edge.to) sum += subtended(edge.offset, leaves, edge.to);
   }
-  if (apart) return Radians(hub_inside ? 2 * kPi : 0.0);
-  return Radians(sum > 0.0 ? std::min(sum, 2 * kPi) : 0.0);
+  if (apart) return Radians(hub_inside ? 2 * kPi : Real(0));
+  return Radians(sum > 0 ? std::min(sum, 2 * kPi) : Real(0));
 }
 
 }  // namespace kphi::compensation

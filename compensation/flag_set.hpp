@@ -12,20 +12,17 @@ class FlagSet {
   [[nodiscard]] constexpr bool any() const noexcept { return bits_ != 0; }
   [[nodiscard]] constexpr bool has(Flag flag) const noexcept { return (bits_ & static_cast<unsigned>(flag)) != 0; }
   /// The sum of the enumerators, as the C interface returns it.
-  [[nodiscard]] constexpr std::uint8_t bits() const noexcept { return bits_; }
-  /// These flags, and `flag` if `raised`.
+  [[nodiscard]] constexpr std::uint16_t bits() const noexcept { return bits_; }
+  /// These flags, with this one as `raised` says.
   [[nodiscard]] constexpr FlagSet with(Flag flag, bool raised) const noexcept {
-    return with(static_cast<std::uint8_t>(raised ? static_cast<unsigned>(flag) : 0u));
-  }
-  /// These flags, and those of `bits`.
-  [[nodiscard]] constexpr FlagSet with(std::uint8_t bits) const noexcept {
+    const auto bit = static_cast<unsigned>(flag);
     FlagSet result;
-    result.bits_ = static_cast<std::uint8_t>(bits_ | bits);
+    result.bits_ = static_cast<std::uint16_t>(raised ? bits_ | bit : bits_ & ~bit);
     return result;
   }
 
  private:
-  std::uint8_t bits_ = 0;
+  std::uint16_t bits_ = 0;
 };
 
 }  // namespace kphi::compensation

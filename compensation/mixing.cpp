@@ -6,275 +6,247 @@
 namespace kphi::compensation {
 namespace {
 
-using Four = std::array<double, 4>;
-
-constexpr double kLargestDemand = 1e9;     // N, N m: beyond it the arithmetic could overflow
-constexpr double kLargestDragScale = 1e6;  // and a layout could, too
+constexpr Real kLargestDemand = Real(1e9);     // N, N m: beyond it the arithmetic could overflow
+constexpr Real kLargestDragScale = Real(1e6);  // and a layout could, too
+constexpr bool kDouble = sizeof(Real) == sizeof(double);
 constexpr int kTorqueIterations = 10;
-constexpr double kYawTolerance = 1e-13;
+constexpr int kSearches = 4;
+constexpr int kHalvings = 20;
+constexpr Real kYawTolerance = kDouble ? Real(1e-13) : Real(1e-5);
+constexpr Real kTorqueTolerance = kDouble ? Real(1e-9) : Real(1e-5);
+/// Shares of a vehicle's sizes below which its rotors count as unable to make a torque.
+constexpr Real kFlat = Real(1e-6);
+/// How far, relative to what the rotors can give, a demand may be missed that is only rounding.
+constexpr Real kRounding = kDouble ? Real(1e-9) : Real(1e-4);
 
-double dot(const Four& a, const Four& b) noexcept { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]; }
-
-Four moved(const Four& from, double distance, const Four& along) noexcept {
-  Four result = from;
-  for (std::size_t i = 0; i < 4; ++i) result[i] += distance * along[i];
+/// f = from + distance along.
+Row moved(const Row& from, Real distance, const Row& along) noexcept {
+  Row result = from;
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] += distance * along[i];
   return result;
 }
 
-/// Twice the signed area of the triangle of three hubs.
-double area(const Four& x, const Four& y, std::size_t a, std::size_t b, std::size_t c) noexcept {
-  return (x[b] - x[a]) * (y[c] - y[a]) - (y[b] - y[a]) * (x[c] - x[a]);
-}
-
-struct Range {
-  double low;
-  double high;
-};
-
-struct Limits {
-  Four low;
-  Four high;
-};
-
-bool usable(const RotorLayout& layout, const Four& drag_scale) noexcept {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double x = layout.hubs[i].x.value(), y = layout.hubs[i].y.value();
-    if (!(std::fabs(x) < 1e6) || !(std::fabs(y) < 1e6)) return false;
+bool usable(const RotorLayout& layout, const Row& drag_scale) noexcept {
+  const std::size_t count = layout.hubs.size();
+  if (count < kFewestRotors || layout.spins.size() != count || drag_scale.size() != count) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real x = layout.hubs[i].x.value(), y = layout.hubs[i].y.value();
+    if (!(std::fabs(x) < Real(1e6)) || !(std::fabs(y) < Real(1e6))) return false;
     if (layout.spins[i] != 1 && layout.spins[i] != -1) return false;
-    if (!(drag_scale[i] > 0.0) || !(drag_scale[i] < kLargestDragScale)) return false;
+    if (!(drag_scale[i] > 0) || !(drag_scale[i] < kLargestDragScale)) return false;
   }
   return true;
 }
 
-double within_reason(double demand, bool& odd) noexcept {
-  odd = odd || demand != demand;
-  return demand != demand ? 0.0 : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
+Real within_reason(Real demand, bool& odd) noexcept {
+  odd = odd || std::isnan(demand);
+  return std::isnan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
 }
 
-Limits within_reason(const ThrustLimits& limits, bool& odd) noexcept {
-  Limits result{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double low = limits.smallest[i].value(), high = limits.largest[i].value();
+WithinLimits::Limits within_reason(const ThrustLimits& limits, std::size_t count, bool& odd) noexcept {
+  WithinLimits::Limits result{Row(count), Row(count)};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real low = i < limits.smallest.size() ? limits.smallest[i].value() : Real(0);
+    const Real high = i < limits.largest.size() ? limits.largest[i].value() : Real(0);
     odd = odd || !(low <= high);
-    result.low[i] = low > 0.0 ? std::min(low, kLargestDemand) : 0.0;
+    result.low[i] = low > 0 ? std::min(low, kLargestDemand) : Real(0);
     result.high[i] = high > result.low[i] ? std::min(high, kLargestDemand) : result.low[i];
   }
   return result;
 }
 
-/// Thrusts f = start + shift along_thrust + turn along_yaw, the two moves that leave roll and pitch alone: `shift` [N]
-/// is the change of collective thrust, `turn` [N m] that of yaw.
-class Plane {
- public:
-  Plane(const Four& start, const Four& along_thrust, const Four& along_yaw, const Limits& limits, Range turns) noexcept
-      : start_(start), along_thrust_(along_thrust), along_yaw_(along_yaw), limits_(limits), turns_(turns) {
-    double largest = 0.0;
-    for (const double step : along_yaw_) largest = std::max(largest, std::fabs(step));
-    for (double& step : along_yaw_) {  // a rotor that yaw hardly moves bounds the shift, by a very steep line
-      if (std::fabs(step) < 1e-9 * largest) step = std::copysign(1e-9 * largest, step);
-    }
-  }
-
-  struct Point {
-    double shift;
-    double turn;
-  };
-
-  /// The smallest |shift| for which any turn keeps all rotors within their limits, and the smallest |turn| then.
-  [[nodiscard]] Point nearest() const noexcept {
-    // The room for turning is concave in the shift and made of straight pieces: Newton's steps from outside never pass
-    // its zero, and end after at most as many steps as there are pieces.
-    double shift = 0.0, last_shift = 0.0;
-    Room room = room_at(shift), last = room;
-    for (int step = 0; step < kSteps && room.width() < 0.0; ++step) {
-      if (step > 0 && room.slope() * last.slope() <= 0.0) {  // passed the summit, which is below zero: nothing fits
-        const double bend = last.slope() - room.slope();
-        if (bend != 0.0) {
-          shift = (room.width() - last.width() + last.slope() * last_shift - room.slope() * shift) / bend;
-        }
-        room = room_at(shift);
-        break;
-      }
-      if (room.slope() == 0.0) break;
-      last = room;
-      last_shift = shift;
-      shift -= room.width() / room.slope();
-      room = room_at(shift);
-    }
-    const double middle = 0.5 * (room.low + room.high);
-    const double turn = room.width() < 0.0 ? middle : std::min(std::max(0.0, room.low), room.high);
-    return {shift, std::min(std::max(turn, turns_.low), turns_.high)};
-  }
-
-  [[nodiscard]] Four at(Point point) const noexcept {
-    return moved(moved(start_, point.shift, along_thrust_), point.turn, along_yaw_);
-  }
-
- private:
-  static constexpr int kSteps = 12;
-
-  struct Room {
-    double low, high;              // of the turn
-    double low_slope, high_slope;  // per shift
-    [[nodiscard]] double width() const noexcept { return high - low; }
-    [[nodiscard]] double slope() const noexcept { return high_slope - low_slope; }
-  };
-
-  [[nodiscard]] Room room_at(double shift) const noexcept {
-    Room room{turns_.low, turns_.high, 0.0, 0.0};
-    for (std::size_t i = 0; i < 4; ++i) {
-      const double thrust = start_[i] + shift * along_thrust_[i], step = along_yaw_[i];
-      const double slope = -along_thrust_[i] / step;
-      double low = (limits_.low[i] - thrust) / step, high = (limits_.high[i] - thrust) / step;
-      if (step < 0.0) std::swap(low, high);
-      if (low > room.low) {
-        room.low = low;
-        room.low_slope = slope;
-      }
-      if (high < room.high) {
-        room.high = high;
-        room.high_slope = slope;
-      }
-    }
-    return room;
-  }
-
-  Four start_, along_thrust_, along_yaw_;
-  Limits limits_;
-  Range turns_;
-};
-
-/// Yaw may go towards zero, no further than to what is assured.
-Range turns_allowed(double yaw, double assured) noexcept {
-  const double give = std::max(0.0, std::fabs(yaw) - (assured > 0.0 ? assured : 0.0));
-  return yaw > 0.0 ? Range{-give, 0.0} : Range{0.0, give};
-}
-
-bool within(const Four& thrusts, const Limits& limits) noexcept {
-  for (std::size_t i = 0; i < 4; ++i) {
+bool within(const Row& thrusts, const WithinLimits::Limits& limits) noexcept {
+  for (std::size_t i = 0; i < thrusts.size(); ++i) {
     if (!(thrusts[i] >= limits.low[i] && thrusts[i] <= limits.high[i])) return false;
   }
   return true;
 }
 
-/// How far, relative to the thrusts at hand, a cut may go that is only rounding.
-double rounding_of(const Four& thrusts) noexcept {
-  double largest = 1.0;
-  for (const double thrust : thrusts) largest = std::max(largest, std::fabs(thrust));
-  return 1e-9 * largest;
+/// From what is assured of a yaw to all of it.
+Range yaw_from(Real assured, Real yaw) noexcept {
+  const Real least = std::min(assured > 0 ? assured : Real(0), std::fabs(yaw));
+  return yaw > 0 ? Range{least, yaw} : Range{yaw, -least};
+}
+
+/// The largest.
+Real size_of(const Row& row) noexcept {
+  Real most = 0;
+  for (const Real value : row) most = std::max(most, std::fabs(value));
+  return most;
+}
+
+Row negative(Row row) noexcept {
+  for (Real& value : row) value = -value;
+  return row;
 }
 
 }  // namespace
 
 std::optional<Mixer> Mixer::build(const RotorLayout& layout, DragTorque drag) noexcept {
-  const double per_newton = drag.per_newton.value();
-  if (!(per_newton > 0.0) || !(per_newton < 1e6) || !(std::fabs(drag.per_square_newton) < 1e6)) return std::nullopt;
+  const Real per_newton = drag.per_newton.value();
+  if (!(per_newton > 0) || !(per_newton < Real(1e6)) || !(std::fabs(drag.per_square_newton) < Real(1e6))) {
+    return std::nullopt;
+  }
   Mixer mixer(drag);
   if (!mixer.set_layout(layout)) return std::nullopt;
   return mixer;
 }
 
-bool Mixer::set_layout(const RotorLayout& layout, const std::array<double, 4>& drag_scale) noexcept {
-  if (!usable(layout, drag_scale)) return false;
+bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
+  const std::size_t count = layout.hubs.size();
   Mixer next(drag_);
-  next.drag_scale_ = drag_scale;
-  double reach = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
+  next.drag_scale_ = drag_scale.size() == 0 ? Row(count, 1) : drag_scale;
+  if (!usable(layout, next.drag_scale_)) return false;
+  next.x_ = next.y_ = next.spins_ = Row(count);
+  const Real share = 1 / static_cast<Real>(count);
+  Real mean_x = 0, mean_y = 0;
+  for (std::size_t i = 0; i < count; ++i) {
     next.x_[i] = layout.hubs[i].x.value();
     next.y_[i] = layout.hubs[i].y.value();
-    next.spins_[i] = layout.spins[i];
-    next.mean_x_ += next.x_[i] / 4;
-    next.mean_y_ += next.y_[i] / 4;
+    next.spins_[i] = static_cast<Real>(layout.spins[i]);
+    mean_x += next.x_[i] * share;
+    mean_y += next.y_[i] * share;
   }
-  double xx = 0.0, xy = 0.0, yy = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    next.spread_x_[i] = next.x_[i] - next.mean_x_;
-    next.spread_y_[i] = next.y_[i] - next.mean_y_;
-    xx += next.spread_x_[i] * next.spread_x_[i];
-    xy += next.spread_x_[i] * next.spread_y_[i];
-    yy += next.spread_y_[i] * next.spread_y_[i];
-    reach = std::max({reach, std::fabs(next.spread_x_[i]), std::fabs(next.spread_y_[i])});
+  Row x = next.x_, y = next.y_;  // about their mean
+  Real reach = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    x[i] -= mean_x;
+    y[i] -= mean_y;
+    xx += x[i] * x[i];
+    xy += x[i] * y[i];
+    yy += y[i] * y[i];
+    reach = std::max({reach, std::fabs(x[i]), std::fabs(y[i])});
   }
-  const double determinant = xx * yy - xy * xy;
-  if (!(determinant > 1e-6 * reach * reach * reach * reach)) return false;
-  next.xx_ = xx / determinant;
-  next.xy_ = xy / determinant;
-  next.yy_ = yy / determinant;
-  next.torque_free_ = {area(next.x_, next.y_, 1, 2, 3), -area(next.x_, next.y_, 0, 2, 3),
-                       area(next.x_, next.y_, 0, 1, 3), -area(next.x_, next.y_, 0, 1, 2)};
-  const Four arms = next.yaw_arms({{0, 0, 0, 0}});
-  double possible = 0.0;
-  for (std::size_t i = 0; i < 4; ++i) possible += std::fabs(arms[i] * next.torque_free_[i]);
-  if (!(std::fabs(dot(arms, next.torque_free_)) > 1e-6 * possible)) return false;
+  const Real determinant = xx * yy - xy * xy;
+  if (!(determinant > kFlat * reach * reach * reach * reach)) return false;
+  // The least squares of all thrusts that make a roll about the mean are along y and x, the thrust is 1/n of each.
+  next.per_thrust_ = next.per_roll_ = next.per_pitch_ = Row(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    next.per_roll_[i] = (xx * y[i] - xy * x[i]) / determinant;
+    next.per_pitch_[i] = (xy * y[i] - yy * x[i]) / determinant;
+    next.per_thrust_[i] = share - mean_y * next.per_roll_[i] + mean_x * next.per_pitch_[i];
+  }
+  next.arms_ = next.yaw_arms(Row(count));
+  next.free_ = next.torque_free(next.arms_);
+  const Real square = dot(next.free_, next.free_);
+  next.yaws_ = count > kFewestRotors;
+  if (next.yaws_ && !(square > kFlat * kFlat * dot(next.arms_, next.arms_))) return false;
   *this = next;
   return true;
 }
 
-Mixer::Four Mixer::yaw_arms(const Four& thrusts) const noexcept {
-  const double per_newton = drag_.per_newton.value();
-  Four arms{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double uncovered = drag_scale_[i] * std::max(thrusts[i], 0.0);
-    const double torque = per_newton + drag_.per_square_newton * uncovered;
-    arms[i] = spins_[i] * drag_scale_[i] * std::min(std::max(torque, 0.5 * per_newton), 2 * per_newton);
+Row Mixer::yaw_arms(const Row& thrusts) const noexcept {
+  const Real per_newton = drag_.per_newton.value();
+  Row arms(rotors());
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const Real uncovered = drag_scale_[i] * std::max(thrusts[i], Real(0));
+    const Real torque = per_newton + drag_.per_square_newton * uncovered;
+    arms[i] = spins_[i] * drag_scale_[i] * std::min(std::max(torque, per_newton / 2), 2 * per_newton);
   }
   return arms;
 }
 
-Mixer::Four Mixer::without_yaw(double thrust, double roll, double pitch) const noexcept {
-  // f_i = thrust/4 + a y'_i + b x'_i with y', x' about the hubs' mean: the least squares of all thrusts that do it.
-  const double about_x = roll - mean_y_ * thrust, about_y = -pitch - mean_x_ * thrust;
-  const double a = xx_ * about_x - xy_ * about_y, b = yy_ * about_y - xy_ * about_x;
-  return moved(moved({{thrust / 4, thrust / 4, thrust / 4, thrust / 4}}, a, spread_y_), b, spread_x_);
+Row Mixer::torque_free(const Row& arms) const noexcept {
+  Real thrust = 0;
+  const Real roll = dot(y_, arms), pitch = -dot(x_, arms);
+  for (const Real arm : arms) thrust += arm;
+  Row rest = arms;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    rest[i] -= thrust * per_thrust_[i] + roll * per_roll_[i] + pitch * per_pitch_[i];
+  }
+  return rest;
+}
+
+void Mixer::add_yaw(Row& thrusts, Real yaw, Row& arms) const noexcept {
+  const auto give = [&](const Row& free) { return moved(thrusts, (yaw - dot(arms, thrusts)) / dot(free, free), free); };
+  Row given = give(free_);
+  for (int i = 0; i < kTorqueIterations && std::fabs(drag_.per_square_newton) > 0; ++i) {
+    arms = yaw_arms(given);
+    const Row free = torque_free(arms);
+    if (std::fabs(dot(arms, given) - yaw) <= kYawTolerance * dot(free, free)) break;
+    given = give(free);
+  }
+  thrusts = given;
+}
+
+Row Mixer::give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
+                   int& steps) const noexcept {
+  const Range promised = yaw_from(0, asked.yaw), kept = yaw_from(assured, asked.yaw);
+  const auto search_with = [&](const Row& arms) {
+    WithinLimits search(held, wanted);
+    if (yaws_) search.reach(arms, promised, WithinLimits::Keep::within);
+    search.reach(y_, negative(x_), asked.roll, asked.pitch);
+    if (yaws_) search.reach(arms, kept, WithinLimits::Keep::within);
+    search.reach(Row(rotors(), 1), {asked.thrust, asked.thrust});
+    if (yaws_) search.reach(arms, {asked.yaw, asked.yaw}, WithinLimits::Keep::within);
+    steps += search.steps();
+    return search.thrusts();
+  };
+  Row arms = yaw_arms(wanted), given = search_with(arms);
+  if (!yaws_ || !(std::fabs(drag_.per_square_newton) > 0)) return given;
+  // What yaw is out of its promise by, with the torque of these thrusts.
+  const auto out_by = [&](const Row& thrusts) {
+    const Real yaw = dot(yaw_arms(thrusts), thrusts);
+    return std::fabs(yaw - std::min(std::max(yaw, promised.low), promised.high));
+  };
+  Row safe = held.low;
+  for (int i = 1; i < kSearches; ++i) {
+    const Row next = yaw_arms(given);
+    if (std::fabs(dot(next, given) - dot(arms, given)) <= kTorqueTolerance * size_of(arms) * size_of(given)) break;
+    if (!(out_by(given) > 0)) safe = given;
+    arms = next;
+    given = search_with(arms);
+  }
+  // It may go to and fro between two sets of limits, or end a little outside. Then towards what keeps the promise.
+  if (!(out_by(given) > 0)) return given;
+  Real good = 1, bad = 0;
+  const auto between = [&](Real share) { return moved(moved(given, -share, given), share, safe); };
+  for (int i = 0; i < kHalvings; ++i) {
+    const Real middle = (good + bad) / 2;
+    (out_by(between(middle)) > 0 ? bad : good) = middle;
+  }
+  return between(good);
 }
 
 MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, NewtonMetres assured_yaw) const noexcept {
   bool odd = false;
-  const double thrust = within_reason(demand.thrust.value(), odd), roll = within_reason(demand.roll.value(), odd),
-               pitch = within_reason(demand.pitch.value(), odd), yaw = within_reason(demand.yaw.value(), odd);
-  const Limits held = within_reason(limits, odd);
+  const Real thrust = within_reason(demand.thrust.value(), odd), roll = within_reason(demand.roll.value(), odd),
+             pitch = within_reason(demand.pitch.value(), odd), yaw = within_reason(demand.yaw.value(), odd);
+  const WithinLimits::Limits held = within_reason(limits, rotors(), odd);
 
-  const Four base = without_yaw(thrust, roll, pitch);
-  Four arms = yaw_arms({{thrust / 4, thrust / 4, thrust / 4, thrust / 4}});
-  Four wanted = base;
-  for (int i = 0; i < kTorqueIterations; ++i) {
-    wanted = moved(base, (yaw - dot(arms, base)) / dot(arms, torque_free_), torque_free_);
-    if (drag_.per_square_newton == 0.0) break;
-    const Four next = yaw_arms(wanted);
-    const bool met = std::fabs(dot(next, wanted) - yaw) <= kYawTolerance * std::fabs(dot(next, torque_free_));
-    if (met || dot(next, torque_free_) * dot(arms, torque_free_) <= 0.0) break;
-    arms = next;
+  Row wanted(rotors());
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    wanted[i] = thrust * per_thrust_[i] + roll * per_roll_[i] + pitch * per_pitch_[i];
   }
-
-  Concessions concessions = Concessions().with(Concession::demand_nan, odd);
-  Four given = wanted;
-  if (!within(wanted, held)) {
-    Four per_yaw{};
-    per_yaw = moved(per_yaw, 1.0 / dot(arms, torque_free_), torque_free_);
-    const Four unit = without_yaw(1.0, 0.0, 0.0);
-    const Four per_thrust = moved(unit, -dot(arms, unit), per_yaw);
-    const Plane plane(wanted, per_thrust, per_yaw, held, turns_allowed(yaw, assured_yaw.value()));
-    const Plane::Point point = plane.nearest();
-    given = plane.at(point);
-    concessions = concessions.with(Concession::yaw, point.turn != 0.0).with(Concession::thrust, point.shift != 0.0);
-  }
+  Row arms = arms_;
+  if (yaws_) add_yaw(wanted, yaw, arms);
 
   MixedThrusts mixed;
-  const double rounding = rounding_of(given);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double cut = given[i] > held.low[i] ? std::min(given[i], held.high[i]) : held.low[i];
-    concessions = concessions.with(Concession::roll_pitch, !(std::fabs(cut - given[i]) <= rounding));
-    mixed.thrusts[i] = Newtons(cut);
+  if (!within(wanted, held))
+    wanted = give_up(wanted, {thrust, roll, pitch, yaw}, held, assured_yaw.value(), mixed.steps);
+  mixed.thrusts = Rotors<Newtons>(rotors());
+  Real most = 1;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    mixed.thrusts[i] = Newtons(wanted[i]);
+    most = std::max(most, std::fabs(wanted[i]));
   }
   mixed.achieved = wrench_of(mixed.thrusts);
-  mixed.concessions = concessions;
+  const auto missed = [&](Real got, Real asked, Real arm) { return std::fabs(got - asked) > kRounding * most * arm; };
+  const Real arm = std::max(size_of(x_), size_of(y_));
+  mixed.concessions = Concessions()
+                          .with(Concession::demand_nan, odd)
+                          .with(Concession::thrust, missed(mixed.achieved.thrust.value(), thrust, 1))
+                          .with(Concession::roll_pitch, missed(mixed.achieved.roll.value(), roll, arm) ||
+                                                            missed(mixed.achieved.pitch.value(), pitch, arm))
+                          .with(Concession::yaw, missed(mixed.achieved.yaw.value(), yaw, size_of(arms)));
   return mixed;
 }
 
-Wrench Mixer::wrench_of(const std::array<Newtons, 4>& thrusts) const noexcept {
-  const Four f{{thrusts[0].value(), thrusts[1].value(), thrusts[2].value(), thrusts[3].value()}};
-  return {Newtons(f[0] + f[1] + f[2] + f[3]), NewtonMetres(dot(y_, f)), NewtonMetres(-dot(x_, f)),
-          NewtonMetres(dot(yaw_arms(f), f))};
+Wrench Mixer::wrench_of(const Rotors<Newtons>& thrusts) const noexcept {
+  Row f(rotors());
+  Real sum = 0;
+  for (std::size_t i = 0; i < rotors(); ++i) sum += f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
+  return {Newtons(sum), NewtonMetres(dot(y_, f)), NewtonMetres(-dot(x_, f)), NewtonMetres(dot(yaw_arms(f), f))};
 }
 
 }  // namespace kphi::compensation

@@ -1,7 +1,6 @@
 // From collective thrust and body torques to the thrust of each rotor of a vehicle whose rotors move, and what to give
 // up when the rotors cannot give it all: yaw first, then collective thrust, roll and pitch last (the iterative mixing
-// and the saturation of Faessler et al. 2016, there for a vehicle of fixed symmetric shape and one limit for all
-// rotors).
+// and the order of Faessler et al. 2016, there for a quadrotor of fixed symmetric shape and one limit for all rotors).
 //
 // The allocation A, in the body frame x forward, y left, z up, rotor positions relative to the centre of gravity:
 //   [thrust; roll; pitch; yaw] = A f,   columns of A: [1; y_i; −x_i; s_i κ_i(f_i)],   f_i [N], κ_i [m].
@@ -10,30 +9,26 @@
 // copy the Mixer (trivially copyable) between threads. No NaN comes out whatever goes in.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <type_traits>
 
-#include "compensation/airframe.hpp"
+#include "compensation/balance.hpp"
 #include "compensation/flag_set.hpp"
+#include "compensation/priorities.hpp"
+#include "compensation/rotors.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
-
-/// Where the rotors stand and which way their drag turns the body, in the order of the rotors.
-struct RotorLayout {
-  std::array<HubPosition, 4> hubs{};         ///< relative to the centre of gravity, x forward, y left [m]
-  std::array<int, 4> spins{{1, -1, 1, -1}};  ///< s_i: +1 where the drag torque points along +z, −1 else
-};
 
 /// How much a rotor turns the body. Torque follows the speed, and the uncovered thrust f⁰ = K_T ω² tells the speed:
 /// torque = f⁰ (per_newton + per_square_newton f⁰), with f⁰ = drag_scale f, drag_scale = 1/k_i.
 /// Torque per thrust, κ(f) = drag_scale (per_newton + per_square_newton drag_scale f), the bracket held within half and
 /// twice per_newton.
 struct DragTorque {
-  Metres per_newton{0.0};          ///< N m per N, positive, e.g. 0.0133
-  double per_square_newton = 0.0;  ///< N m per N²; how κ changes with the load; 0: κ is constant
+  Metres per_newton{0};        ///< N m per N, positive, e.g. 0.0133
+  Real per_square_newton = 0;  ///< N m per N²; how κ changes with the load; 0: κ is constant
 };
 
 /// Collective thrust [N] along +z and torques [N m] about x (roll), y (pitch) and z (yaw).
@@ -44,26 +39,28 @@ struct Wrench {
   NewtonMetres yaw;
 };
 
-/// What each rotor can give: [0, Compensator::thrust_max()], or narrower.
+/// What each rotor can give: [0, Compensator::thrust_max()], or narrower. Missing ones count as 0.
 struct ThrustLimits {
-  std::array<Newtons, 4> smallest{};
-  std::array<Newtons, 4> largest{};
+  Rotors<Newtons> smallest;
+  Rotors<Newtons> largest;
 };
 
 /// What had to be given up. None of them is an error.
 enum class Concession : std::uint8_t {
-  yaw = 1,         ///< the yaw torque is smaller than demanded (never larger, never of the other sign)
-  thrust = 2,      ///< the collective thrust was shifted along A⁻¹e_thrust, which leaves all three torques alone
-  roll_pitch = 4,  ///< no thrust and yaw let roll and pitch be met: rotors were cut at their limits
+  yaw = 1,         ///< the yaw torque is smaller than demanded (never larger, never of the other sign, if the smallest
+                   ///< thrusts allow it)
+  thrust = 2,      ///< the collective thrust is another one than demanded
+  roll_pitch = 4,  ///< no thrust and yaw let roll and pitch be met: they miss their demand by as little as can be
   demand_nan = 8,  ///< a demand was NaN and counted as 0, or a rotor's limits were NaN or crossed and counted as closed
 };
 
 using Concessions = FlagSet<Concession>;
 
 struct MixedThrusts {
-  std::array<Newtons, 4> thrusts;  ///< within the limits; goes to Compensator::speeds_for
-  Wrench achieved;                 ///< A f with κ(f) at these thrusts
+  Rotors<Newtons> thrusts;  ///< within the limits; goes to Compensator::speeds_for
+  Wrench achieved;          ///< A f with κ(f) at these thrusts
   Concessions concessions;
+  int steps = 0;  ///< of the search within the limits: 0 where the demand could be met
 };
 
 class Mixer {
@@ -72,39 +69,51 @@ class Mixer {
   [[nodiscard]] static std::optional<Mixer> build(const RotorLayout& layout, DragTorque drag) noexcept;
 
   /// At servo rate: new positions (relative to the centre of gravity of the new shape) and Compensator::drag_scale(),
-  /// each at least 1. False, and the layout before is kept, if a number is not finite, a spin is neither +1 nor −1, a
-  /// drag scale is not positive, or the rotors cannot make every torque (hubs on one line, or a yaw that no difference
-  /// of thrusts gives).
-  bool set_layout(const RotorLayout& layout, const std::array<double, 4>& drag_scale = {{1, 1, 1, 1}}) noexcept;
+  /// each positive; none: 1 for every rotor. False, and the layout before is kept, if it has not 3 to 8 hubs and as
+  /// many spins, a number is not finite, a spin is neither +1 nor −1, a drag scale is not positive, or the rotors
+  /// cannot make every torque (hubs on one line, or a yaw that no difference of thrusts gives). Three rotors never make
+  /// a yaw of their own: there it comes as it comes, and a tail servo must answer for it.
+  bool set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale = {}) noexcept;
 
-  /// At control rate. f = A⁻¹ demand, iterated for κ(f) from demand.thrust/4, if that is within the limits. Else, in
-  /// this order, exactly and with the smallest change:
-  /// 1. yaw goes down, no further than to `assured_yaw` [N m, absolute] (a demand below it is not touched);
-  /// 2. the collective thrust moves, along A⁻¹e_thrust, by as little as yaw's freedom allows;
-  /// 3. where roll and pitch cannot be met at all, each rotor is cut at its limits.
-  /// Where one move of each kind is enough this is the scheme of the paper: "the worst rotor at its limit". Two rotors
-  /// that break their limits on opposite sides of yaw cost it collective thrust that yaw could have given; here they do
-  /// not.
+  /// At control rate. The smallest thrusts f (least squares) with A f = demand, iterated for κ(f), if they are within
+  /// the limits. Else, in this order, each as far as those before it allow:
+  /// 1. yaw stays between 0 and its demand;
+  /// 2. roll and pitch miss their demand by as little as can be (least squares);
+  /// 3. yaw keeps `assured_yaw` [N m, absolute] of its demand;
+  /// 4. the collective thrust comes as near as it can;
+  /// 5. and so does yaw.
   [[nodiscard]] MixedThrusts mix(const Wrench& demand, const ThrustLimits& limits,
-                                 NewtonMetres assured_yaw = NewtonMetres(0.0)) const noexcept;
+                                 NewtonMetres assured_yaw = NewtonMetres(0)) const noexcept;
 
   /// A f, the wrench of these thrusts [N], with κ(f).
-  [[nodiscard]] Wrench wrench_of(const std::array<Newtons, 4>& thrusts) const noexcept;
+  [[nodiscard]] Wrench wrench_of(const Rotors<Newtons>& thrusts) const noexcept;
+  /// 3 to 8.
+  [[nodiscard]] std::size_t rotors() const noexcept { return x_.size(); }
+  /// Whether differences of thrusts make yaw: not with three rotors.
+  [[nodiscard]] bool yaws() const noexcept { return yaws_; }
 
  private:
   explicit Mixer(DragTorque drag) noexcept : drag_(drag) {}
-  using Four = std::array<double, 4>;
-  [[nodiscard]] Four yaw_arms(const Four& thrusts) const noexcept;
-  [[nodiscard]] Four without_yaw(double thrust, double roll, double pitch) const noexcept;
+  [[nodiscard]] Row yaw_arms(const Row& thrusts) const noexcept;
+  /// The part of `arms` that makes neither thrust, roll nor pitch: the least thrusts for yaw are along it.
+  [[nodiscard]] Row torque_free(const Row& arms) const noexcept;
+  /// Adds to `thrusts` what they lack of yaw; `arms` are those of the result.
+  void add_yaw(Row& thrusts, Real yaw, Row& arms) const noexcept;
+
+  struct Asked {
+    Real thrust, roll, pitch, yaw;
+  };
+  /// Within the limits, by the order of mix(). Adds to `steps`.
+  [[nodiscard]] Row give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
+                            int& steps) const noexcept;
 
   DragTorque drag_;
-  Four x_{}, y_{};                // hubs [m]
-  Four spread_x_{}, spread_y_{};  // hubs about their mean [m]
-  double mean_x_ = 0.0, mean_y_ = 0.0;
-  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;  // inverse of the hubs' second moments [1/m²]
-  Four drag_scale_{{1, 1, 1, 1}};
-  Four spins_{};
-  Four torque_free_{};  // thrusts that make neither thrust, roll nor pitch: areas of the opposite triangles
+  Row x_, y_;                              // hubs [m]
+  Row per_thrust_, per_roll_, per_pitch_;  // the least thrusts for one newton or newton metre of each
+  Row arms_, free_;                        // yaw_arms() and torque_free() of rotors at rest
+  Row drag_scale_;
+  Row spins_;
+  bool yaws_ = true;
 };
 
 static_assert(std::is_trivially_copyable<Mixer>::value, "a Mixer is copied between threads as bytes");

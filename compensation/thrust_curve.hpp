@@ -20,20 +20,20 @@ enum class ScalingLaw : std::uint8_t {
 };
 
 /// The smallest k_i of ScalingLaw::clamped: the speed is raised by 1/sqrt(0.1) = 3.16 at most.
-inline constexpr double kScalingFloor = 0.1;
+inline constexpr Real kScalingFloor = Real(0.1);
 
 /// How well K_T and the line are known, one standard deviation, SI.
 struct LineUncertainty {
-  double thrust_coefficient = 0.0;  ///< of K_T [N/(rad/s)²]
-  double intercept_variance = 0.0;  ///< of the line, [N/(rad/s)²]²
-  double covariance = 0.0;          ///< of intercept and slope, per rad
-  double slope_variance = 0.0;      ///< per rad²
+  Real thrust_coefficient = 0;  ///< of K_T [N/(rad/s)²]
+  Real intercept_variance = 0;  ///< of the line, [N/(rad/s)²]²
+  Real covariance = 0;          ///< of intercept and slope, per rad
+  Real slope_variance = 0;      ///< per rad²
 };
 
 /// k(φ) = intercept + slope φ.
 struct Line {
   ThrustCoefficient intercept;  ///< k at φ = 0 [N/(rad/s)²], positive; K_T only if the fit was anchored
-  double slope_per_rad = 0;     ///< N/(rad/s)² per rad, finite, usually negative
+  Real slope_per_rad = 0;       ///< N/(rad/s)² per rad, finite, usually negative
   std::optional<LineUncertainty> uncertainty{};
 };
 
@@ -45,7 +45,7 @@ class ThrustCurve {
   /// `largest_fitted`, the widest occlusion behind the line, in (0, 2π], and the uncertainty, if given, finite with
   /// variances not negative.
   [[nodiscard]] static std::optional<ThrustCurve> from_line(
-      ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, double slope_per_rad, Radians largest_fitted,
+      ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, Real slope_per_rad, Radians largest_fitted,
       OverlapMeasure overlap = OverlapMeasure::rim_arc,
       const std::optional<LineUncertainty>& uncertainty = std::nullopt) noexcept;
 
@@ -68,24 +68,24 @@ class ThrustCurve {
     return line_.intercept + ThrustCoefficient(line_.slope_per_rad * occlusion_angle.value());
   }
   /// Standard uncertainty of k(φ) [N/(rad/s)²]; +∞ if unknown.
-  [[nodiscard]] double standard_error_at(Radians occlusion_angle) const noexcept;
+  [[nodiscard]] Real standard_error_at(Radians occlusion_angle) const noexcept;
   /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
-  [[nodiscard]] double scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept {
-    const double reference = thrust_coefficient_.value();
-    const double k = at(occlusion_angle).value();
-    if (law == ScalingLaw::published) return 1.0 - std::fabs(reference - k) / reference;
-    if (!(occlusion_angle.value() > 0.0)) return 1.0;
-    return std::min(1.0, std::max(kScalingFloor, k / reference));
+  [[nodiscard]] Real scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept {
+    const Real reference = thrust_coefficient_.value();
+    const Real k = at(occlusion_angle).value();
+    if (law == ScalingLaw::published) return 1 - std::fabs(reference - k) / reference;
+    if (!(occlusion_angle.value() > 0)) return 1;
+    return std::min(Real(1), std::max(kScalingFloor, k / reference));
   }
   /// Standard uncertainty of K_T k_i relative to itself, from K_T, the curve and the angle's own `angle_uncertainty`;
   /// the speed ω = sqrt(T/(K_T k_i)) has half of it. Where k_i is held at 1 it is K_T's alone. K_T and the curve count
   /// as independent. +∞ where none can be given: no uncertainty known, k_i at its floor or below, φ NaN.
-  [[nodiscard]] double relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
-                                            ScalingLaw law = ScalingLaw::clamped) const noexcept;
+  [[nodiscard]] Real relative_uncertainty(Radians occlusion_angle, Radians angle_uncertainty,
+                                          ScalingLaw law = ScalingLaw::clamped) const noexcept;
 
   /// The curve raised by `raised` everywhere, with what it changes over φ times `steepness`; K_T and everything else
   /// stays. nullopt if k(0) is not positive then.
-  [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, double steepness) const noexcept {
+  [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, Real steepness) const noexcept {
     return from_line(thrust_coefficient_, line_.intercept + raised, line_.slope_per_rad * steepness, largest_fitted_,
                      overlap_, line_.uncertainty);
   }

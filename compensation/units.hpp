@@ -1,35 +1,43 @@
-// Units at boundaries. A Quantity is a double that remembers what it measures; SI inside, and RPM, degrees,
+// Units at boundaries. A Quantity is a number that remembers what it measures; SI inside, and RPM, degrees,
 // gram-force and N/RPM² exist only as named ways in and out. No conversion happens by itself.
 #pragma once
 
 namespace kphi {
 
-inline constexpr double kPi = 3.14159265358979323846;
+/// What the library that flies computes with: double, or float where the processor knows no more (KPHI_FLOAT, which the
+/// library and all that include it must agree on: it is part of Quantity's name, so the linker finds who does not).
+#ifdef KPHI_FLOAT
+using Real = float;
+#else
+using Real = double;
+#endif
+
+inline constexpr Real kPi = Real(3.14159265358979323846);
 
 /// A number with a unit. `value()` is in the SI unit that the alias below names.
-template <class Unit>
+template <class Unit, class Number = Real>
 class Quantity {
  public:
   constexpr Quantity() noexcept = default;
-  constexpr explicit Quantity(double value) noexcept : value_(value) {}
-  [[nodiscard]] constexpr double value() const noexcept { return value_; }
+  constexpr explicit Quantity(Number value) noexcept : value_(value) {}
+  [[nodiscard]] constexpr Number value() const noexcept { return value_; }
 
   friend constexpr Quantity operator+(Quantity a, Quantity b) noexcept { return Quantity(a.value_ + b.value_); }
   friend constexpr Quantity operator-(Quantity a, Quantity b) noexcept { return Quantity(a.value_ - b.value_); }
   friend constexpr Quantity operator-(Quantity a) noexcept { return Quantity(-a.value_); }
-  friend constexpr Quantity operator*(Quantity a, double scale) noexcept { return Quantity(a.value_ * scale); }
-  friend constexpr Quantity operator*(double scale, Quantity a) noexcept { return Quantity(scale * a.value_); }
-  friend constexpr Quantity operator/(Quantity a, double scale) noexcept { return Quantity(a.value_ / scale); }
-  friend constexpr double operator/(Quantity a, Quantity b) noexcept { return a.value_ / b.value_; }
-  friend constexpr bool operator==(Quantity a, Quantity b) noexcept { return a.value_ == b.value_; }
-  friend constexpr bool operator!=(Quantity a, Quantity b) noexcept { return a.value_ != b.value_; }
+  friend constexpr Quantity operator*(Quantity a, Number scale) noexcept { return Quantity(a.value_ * scale); }
+  friend constexpr Quantity operator*(Number scale, Quantity a) noexcept { return Quantity(scale * a.value_); }
+  friend constexpr Quantity operator/(Quantity a, Number scale) noexcept { return Quantity(a.value_ / scale); }
+  friend constexpr Number operator/(Quantity a, Quantity b) noexcept { return a.value_ / b.value_; }
+  friend constexpr bool operator==(Quantity a, Quantity b) noexcept { return a <= b && a >= b; }
+  friend constexpr bool operator!=(Quantity a, Quantity b) noexcept { return !(a == b); }
   friend constexpr bool operator<(Quantity a, Quantity b) noexcept { return a.value_ < b.value_; }
   friend constexpr bool operator>(Quantity a, Quantity b) noexcept { return a.value_ > b.value_; }
   friend constexpr bool operator<=(Quantity a, Quantity b) noexcept { return a.value_ <= b.value_; }
   friend constexpr bool operator>=(Quantity a, Quantity b) noexcept { return a.value_ >= b.value_; }
 
  private:
-  double value_ = 0.0;
+  Number value_ = 0;
 };
 
 using Newtons = Quantity<struct NewtonUnit>;                       ///< N
@@ -44,19 +52,21 @@ using Amperes = Quantity<struct AmpereUnit>;                       ///< A
 using Celsius = Quantity<struct CelsiusUnit>;                      ///< °C
 
 /// 1 RPM in rad/s.
-inline constexpr double kRadPerSecPerRpm = kPi / 30.0;
+inline constexpr Real kRadPerSecPerRpm = kPi / 30;
 
-[[nodiscard]] constexpr RadPerSec from_rpm(double rpm) noexcept { return RadPerSec(rpm * kRadPerSecPerRpm); }
-[[nodiscard]] constexpr double to_rpm(RadPerSec speed) noexcept { return speed.value() / kRadPerSecPerRpm; }
-[[nodiscard]] constexpr Radians from_degrees(double degrees) noexcept { return Radians(degrees * (kPi / 180.0)); }
-[[nodiscard]] constexpr double to_degrees(Radians angle) noexcept { return angle.value() * (180.0 / kPi); }
+[[nodiscard]] constexpr RadPerSec from_rpm(Real rpm) noexcept { return RadPerSec(rpm * kRadPerSecPerRpm); }
+[[nodiscard]] constexpr Real to_rpm(RadPerSec speed) noexcept { return speed.value() / kRadPerSecPerRpm; }
+[[nodiscard]] constexpr Radians from_degrees(Real degrees) noexcept { return Radians(degrees * (kPi / 180)); }
+[[nodiscard]] constexpr Real to_degrees(Radians angle) noexcept { return angle.value() * (180 / kPi); }
 /// 1 gf = 9.80665e-3 N, exactly (CGPM 1901).
-[[nodiscard]] constexpr Newtons from_gram_force(double gram_force) noexcept { return Newtons(gram_force * 9.80665e-3); }
+[[nodiscard]] constexpr Newtons from_gram_force(Real gram_force) noexcept {
+  return Newtons(gram_force * Real(9.80665e-3));
+}
 /// 1 N/RPM² = (30/π)² N/(rad/s)², about 91.19.
-[[nodiscard]] constexpr ThrustCoefficient from_newtons_per_rpm2(double k) noexcept {
+[[nodiscard]] constexpr ThrustCoefficient from_newtons_per_rpm2(Real k) noexcept {
   return ThrustCoefficient(k / (kRadPerSecPerRpm * kRadPerSecPerRpm));
 }
-[[nodiscard]] constexpr double to_newtons_per_rpm2(ThrustCoefficient k) noexcept {
+[[nodiscard]] constexpr Real to_newtons_per_rpm2(ThrustCoefficient k) noexcept {
   return k.value() * (kRadPerSecPerRpm * kRadPerSecPerRpm);
 }
 

@@ -35,7 +35,7 @@ std::optional<compensation::PolygonBody> read_body(ProfileReader& file) {
                 "go round once with the body on the left; leave out corners on the line of their neighbours");
     return std::nullopt;
   }
-  compensation::PolygonBody body{*outline, {}};
+  compensation::PolygonBody body{*outline, compensation::Rotors<compensation::Hinge>(4)};
   for (std::size_t i = 0; i < body.hinges.size(); ++i) {
     const std::string hinge = fmt::format("/body/hinges/{}", i);
     body.hinges[i] = {{Metres(file.number(hinge + "/x_m")), Metres(file.number(hinge + "/y_m"))},
@@ -164,6 +164,8 @@ compensation::Airframe airframe_of(const Vehicle& vehicle) {
   airframe.mirrored = vehicle.arm_mirrored;
   airframe.overlap = vehicle.overlap;
   airframe.polygon = vehicle.body;
+  airframe.arms.from = vehicle.arm_angle_min;
+  airframe.arms.to = vehicle.arm_angle_max;
   return airframe;
 }
 

@@ -11,7 +11,7 @@ using compensation::Mixer;
 using compensation::RotorLayout;
 
 RotorLayout layout_of(const Vehicle& vehicle, const MassProperties& mass) noexcept {
-  RotorLayout layout;
+  RotorLayout layout{compensation::Rotors<compensation::HubPosition>(4), compensation::Rotors<int>(4)};
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d lever = mass.hubs[i] - mass.cog;
     layout.hubs[i] = {Metres(lever.x()), Metres(lever.y())};

@@ -97,7 +97,7 @@ class Pilot {
   [[nodiscard]] Eigen::Vector4d act(const Eigen::Vector3d& body_rates) noexcept;
 
   [[nodiscard]] const compensation::Compensator& compensator() const noexcept { return compensator_; }
-  [[nodiscard]] const std::array<Newtons, 4>& thrusts() const noexcept { return thrusts_; }
+  [[nodiscard]] const compensation::Rotors<Newtons>& thrusts() const noexcept { return thrusts_; }
   /// Steps in which the mixer gave something up.
   [[nodiscard]] int concessions() const noexcept { return concessions_; }
 
@@ -116,7 +116,7 @@ class Pilot {
   double collective_ = kGravity;
   Eigen::Vector3d wanted_rates_{0, 0, 0};
   Eigen::Vector3d feedback_rates_{0, 0, 0};
-  std::array<Newtons, 4> thrusts_{};
+  compensation::Rotors<Newtons> thrusts_;
   int concessions_ = 0;
 };
 

@@ -21,8 +21,6 @@ const std::string kHeader = "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1
 const std::string kOutputHeader =
     "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
 
-const ArmRange kReach{from_degrees(-90), from_degrees(180)};
-
 struct Result {
   RowCounts counts;
   std::string output;
@@ -34,7 +32,7 @@ Result compensated(const std::string& input, RowFormat format = RowFormat::csv) 
   std::ostringstream out, words;
   Compensator compensator = example_compensator();
   Result result;
-  result.counts = compensate_rows(in, out, words, compensator, kReach, format);
+  result.counts = compensate_rows(in, out, words, compensator, format);
   result.output = out.str();
   result.words = words.str();
   return result;
@@ -122,9 +120,10 @@ TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
 }
 
 TEST(CompensateRows, CountsRowsWithAnArmWhereNoServoGoes) {
-  const Result result = compensated(kHeader + "45,45,45,45,1,1,1,1\n45,45,200,-91,1,1,1,1\n45,45,45,180,1,1,1,1\n");
+  const Result result = compensated(kHeader + "45,45,45,45,1,1,1,1\n45,45,200,-101,1,1,1,1\n45,45,45,180,1,1,1,1\n");
   EXPECT_EQ(result.counts.written, 3u) << "180° is the end of the range and in it";
   EXPECT_EQ(result.counts.out_of_reach, 1u);
+  EXPECT_THAT(result.output, HasSubstr(",3:arm_angle_beyond 4:arm_angle_beyond\n"));
 }
 
 TEST(CompensateRows, OfAHeaderAloneIsAHeaderAlone) { EXPECT_EQ(compensated(kHeader).output, kOutputHeader); }
@@ -155,7 +154,7 @@ TEST(CompensateRows, HandsARowOnBeforeWaitingForTheNext) {
   OneLineAtATime source({kHeader, "1,2,3,170,5,6,7,8\n", "1,2,3,170,5,6,7,9\n"}, out);
   std::istream in(&source);
   Compensator compensator = example_compensator();
-  (void)compensate_rows(in, out, words, compensator, kReach, RowFormat::csv);
+  (void)compensate_rows(in, out, words, compensator, RowFormat::csv);
   ASSERT_EQ(source.output_sizes.size(), 4u);
   EXPECT_GT(source.output_sizes[2], kOutputHeader.size());
   EXPECT_GT(source.output_sizes[3], source.output_sizes[2]);

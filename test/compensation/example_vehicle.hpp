@@ -62,7 +62,7 @@ inline Airframe example_airframe_of(double half_side, double arm_length, double 
 
 /// A square as an outline like any other, each arm hinged at its corner.
 inline PolygonBody square_as_polygon(Metres half_side) {
-  PolygonBody body{ConvexPolygon::square(half_side), {}};
+  PolygonBody body{ConvexPolygon::square(half_side), Rotors<Hinge>(4)};
   for (std::size_t i = 0; i < 4; ++i) {
     body.hinges[i] = {body.outline.corner(i), Radians(kPi / 2 * static_cast<double>(i)), false};
   }
@@ -75,7 +75,7 @@ inline BuildOutcome build_with(const ThrustCurve& line, const Airframe& airframe
   return Compensator::build({line, line, line, line}, airframe, law);
 }
 inline Compensator compensator_of(const Airframe& airframe, ScalingLaw law = ScalingLaw::clamped) {
-  return *build_with(paper_line(airframe.overlap), airframe, law).compensator;
+  return build_with(paper_line(airframe.overlap), airframe, law).compensator.value();
 }
 inline Compensator example_compensator(ScalingLaw law = ScalingLaw::clamped) {
   return compensator_of(example_airframe(), law);
@@ -97,7 +97,7 @@ inline Compensator with_arms(const std::array<Radians, 4>& arms, Compensator com
 
 /// The hubs as seen from the middle of the body.
 inline RotorLayout example_layout(const std::array<Radians, 4>& arms) {
-  RotorLayout layout;
+  RotorLayout layout{Rotors<HubPosition>(4), {1, -1, 1, -1}};
   for (std::size_t i = 0; i < 4; ++i) layout.hubs[i] = hub_in_body(example_airframe(), i, arms[i]);
   return layout;
 }

@@ -41,7 +41,7 @@ kphi_compensator built(const kphi_airframe& airframe, int law = KPHI_LAW_CLAMPED
 }
 
 template <class Unit>
-void expect_same(const double (&plain)[4], const std::array<Quantity<Unit>, 4>& typed) {
+void expect_same(const double (&plain)[4], const Rotors<Quantity<Unit>>& typed) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(std::memcmp(&plain[i], &typed[i], sizeof(double)), 0);
 }
 
@@ -59,7 +59,7 @@ TEST(PlainInterface, GivesTheNumbersOfTheClassBitForBit) {
       kphi_enable(&plain, i % 3);
       typed.enable(i % 3 != 0);
       double got[4];
-      unsigned char flags[4];
+      unsigned short flags[4];
       kphi_speeds_for(&plain, thrusts, got, flags);
       const SpeedCommand command = typed.speeds_for(thrusts_of(thrusts[0], thrusts[1], thrusts[2], thrusts[3]));
       expect_same(got, command.speeds);
@@ -143,10 +143,10 @@ TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
 TEST(PlainInterface, MixesAsTheClassDoes) {
   const double hubs[4][2] = {{.128, .128}, {-.128, .128}, {-.128, -.128}, {.128, -.12}};
   const int spins[4] = {1, -1, 1, -1};
-  RotorLayout layout;
+  RotorLayout layout{Rotors<HubPosition>(4), {1, -1, 1, -1}};
   for (std::size_t i = 0; i < 4; ++i) layout.hubs[i] = {Metres(hubs[i][0]), Metres(hubs[i][1])};
   kphi_mixer plain;
-  ASSERT_EQ(kphi_mixer_build(&plain, hubs, spins, 0.0133, 1e-4), 1);
+  ASSERT_EQ(kphi_mixer_build(&plain, 4, hubs, spins, 0.0133, 1e-4), 1);
   Mixer typed = Mixer::build(layout, {Metres(0.0133), 1e-4}).value();
   const double scale[4] = {1.2, 1, 1.1, 1}, demand[4] = {8, .3, -.2, .05}, low[4] = {}, high[4] = {3, 3, 2.5, 3};
   ASSERT_EQ(kphi_mixer_set_layout(&plain, hubs, spins, scale), 1);
@@ -161,7 +161,45 @@ TEST(PlainInterface, MixesAsTheClassDoes) {
   EXPECT_EQ(achieved[3], mixed.achieved.yaw.value());
   const int no_spins[4] = {1, 0, 1, -1};
   EXPECT_EQ(kphi_mixer_set_layout(&plain, hubs, no_spins, scale), 0);
-  EXPECT_EQ(kphi_mixer_build(&plain, hubs, no_spins, 0.0133, 0), 0);
+  EXPECT_EQ(kphi_mixer_build(&plain, 4, hubs, no_spins, 0.0133, 0), 0);
+}
+
+TEST(PlainInterface, KnowsHubsThrottleDoubtsMovingArmsAndItsVersion) {
+  kphi_compensator plain = built(plain_airframe());
+  const double o[4] = {kPi, kPi, kPi, kPi}, rates[4] = {0, 9, 0, 0}, thrusts[4] = {1, 1, 1, 1};
+  kphi_set_moving_arms(&plain, o, rates, 0.02);
+  double numbers[4];
+  unsigned short flags[4];
+  kphi_speeds_for(&plain, thrusts, numbers, flags);
+  EXPECT_EQ(flags[0], 0);
+  EXPECT_EQ(flags[1], KPHI_ARM_ANGLE_STALE);
+  const double degrees[4] = {45, 45, 45, 45};
+  kphi_set_arms(&plain, degrees);
+  kphi_speeds_for(&plain, thrusts, numbers, flags);
+  EXPECT_EQ(flags[2], KPHI_ARM_ANGLE_BEYOND);
+
+  const kphi_masses masses{0.42, {0, 0}, {.045, .045, .045, .045}};
+  double hubs[4][2];
+  kphi_hubs(&plain, &masses, hubs);
+  const RotorLayout layout = with_arms(all_at(180)).layout({0.42, {}, {.045, .045, .045, .045}}, {1, -1, 1, -1});
+  EXPECT_EQ(hubs[3][0], layout.hubs[3].x.value()) << "the shape that was believed last";
+  kphi_uncovered_thrusts(&plain, thrusts, numbers);
+  double factors[4];
+  kphi_scaling_factors(&plain, factors);
+  EXPECT_NEAR(numbers[0], 1 / factors[0], 1e-12);
+  EXPECT_NEAR(kphi_throttle(4, 1, 1), 0.5, 1e-15);
+
+  kphi_line line = plain_line();
+  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), 0);
+  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_PUBLISHED), KPHI_STEPS_AT_CONTACT);
+  line.slope_per_rad = 1e-7;
+  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), KPHI_GAINS_WITH_OCCLUSION);
+  line.intercept = 0;
+  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), -1);
+  EXPECT_STREQ(kphi_compensation_version(), KPHI_COMPENSATION_VERSION);
+  EXPECT_EQ(std::string(KPHI_COMPENSATION_VERSION), std::to_string(KPHI_COMPENSATION_VERSION_MAJOR) + "." +
+                                                        std::to_string(KPHI_COMPENSATION_VERSION_MINOR) + "." +
+                                                        std::to_string(KPHI_COMPENSATION_VERSION_PATCH));
 }
 
 }  // namespace kphi_compensation_test

@@ -30,7 +30,7 @@ Mixer mixer_of(const std::array<Radians, 4>& arms, double per_square_newton = 0.
   return Mixer::build(layout_of(arms), {Metres(kKappa), per_square_newton}).value();
 }
 
-std::array<double, 4> drag_scale_in_o() { return with_arms(shape_o()).drag_scale(); }
+Rotors<Real> drag_scale_in_o() { return with_arms(shape_o()).drag_scale(); }
 
 /// In O, with the drag of covered rotors.
 Mixer occluded_mixer() {
@@ -48,12 +48,10 @@ ThrustLimits limits(double smallest, double largest) {
 }
 
 Eigen::Vector4d vector(const Wrench& w) { return {w.thrust.value(), w.roll.value(), w.pitch.value(), w.yaw.value()}; }
-Eigen::Vector4d vector(const std::array<Newtons, 4>& f) {
-  return {f[0].value(), f[1].value(), f[2].value(), f[3].value()};
-}
+Eigen::Vector4d vector(const Rotors<Newtons>& f) { return {f[0].value(), f[1].value(), f[2].value(), f[3].value()}; }
 
 /// The allocation as the header states it, for constant κ.
-Eigen::Matrix4d allocation(const RotorLayout& layout, const std::array<double, 4>& drag_scale = {{1, 1, 1, 1}}) {
+Eigen::Matrix4d allocation(const RotorLayout& layout, const Rotors<Real>& drag_scale = {1, 1, 1, 1}) {
   Eigen::Matrix4d a;
   for (int i = 0; i < 4; ++i) {
     const auto u = static_cast<std::size_t>(i);
@@ -235,11 +233,11 @@ TEST(Mixer, GivesUpNoMoreThrustThanYawsFreedomLeavesNecessaryAndNoMoreYawThanTha
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> theta(-90, 180), thrust(1, 20), torque(-0.25, 0.25), yaw(-0.1, 0.1), top(2, 6),
       floor(0, 0.3), assured(0, 0.03), scale(1, 1.5), share(0, 1);
-  int yawed = 0, shifted = 0, lost = 0, unsaturated = 0;
+  int yawed = 0, shifted = 0, lost = 0, unsaturated = 0, less_than_assured = 0;
   for (int i = 0; i < 30000; ++i) {
     const RotorLayout layout = layout_of(arms_at(theta(random), theta(random), theta(random), theta(random)));
     auto mixer = Mixer::build(layout, {Metres(kKappa), 0.0});
-    const std::array<double, 4> scales = {scale(random), scale(random), scale(random), scale(random)};
+    const Rotors<Real> scales = {scale(random), scale(random), scale(random), scale(random)};
     if (!mixer || !mixer->set_layout(layout, scales)) continue;
     const Eigen::Matrix4d a = allocation(layout, scales);
     const Eigen::Matrix4d inverse = a.inverse();
@@ -256,17 +254,27 @@ TEST(Mixer, GivesUpNoMoreThrustThanYawsFreedomLeavesNecessaryAndNoMoreYawThanTha
       ASSERT_LE(mixed.thrusts[j], held.largest[j]);
     }
     const double asked = demand.thrust.value(), given = mixed.achieved.thrust.value();
+    const double none = std::min(0.0, demand.yaw.value()), all = std::max(0.0, demand.yaw.value());
+    const auto none_fits = [&](double low, double high) {
+      for (double any = 0; any < 24; any += 0.05) {
+        if (feasible(inverse, demand, any, low, high, held, -1e-6)) return false;
+      }
+      return true;
+    };
     if (mixed.concessions.has(Concession::roll_pitch)) {
       ++lost;
-      for (double any = 0; any < 24; any += 0.05) {
-        ASSERT_FALSE(feasible(inverse, demand, any, from, to, held, -1e-6)) << "vehicle " << i << " at " << any << " N";
-      }
+      ASSERT_TRUE(none_fits(none, all)) << "vehicle " << i;
+      continue;
+    }
+    ASSERT_GE(mixed.achieved.yaw.value(), none - 1e-8);
+    ASSERT_LE(mixed.achieved.yaw.value(), all + 1e-8);
+    if (mixed.achieved.yaw.value() < from - 1e-8 || mixed.achieved.yaw.value() > to + 1e-8) {
+      ++less_than_assured;
+      ASSERT_TRUE(none_fits(from, to)) << "vehicle " << i;
       continue;
     }
     ASSERT_NEAR(mixed.achieved.roll.value(), demand.roll.value(), 1e-8);
     ASSERT_NEAR(mixed.achieved.pitch.value(), demand.pitch.value(), 1e-8);
-    ASSERT_GE(mixed.achieved.yaw.value(), from - 1e-8);
-    ASSERT_LE(mixed.achieved.yaw.value(), to + 1e-8);
     ASSERT_TRUE(feasible(inverse, demand, given, from, to, held, 1e-7));
     if (mixed.concessions.has(Concession::thrust)) {
       ++shifted;
@@ -286,7 +294,64 @@ TEST(Mixer, GivesUpNoMoreThrustThanYawsFreedomLeavesNecessaryAndNoMoreYawThanTha
   EXPECT_GT(yawed, 500);
   EXPECT_GT(shifted, 500);
   EXPECT_GT(lost, 500);
+  EXPECT_GT(less_than_assured, 20);
   EXPECT_GT(unsaturated, 500);
+}
+
+TEST(Mixer, KeepsItsPromiseOnYawInEveryStageAlsoWhereTheTorqueDependsOnTheThrust) {
+  std::mt19937_64 random(9);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  int short_of_roll = 0, most_steps = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const double curvature = i % 2 == 0 ? 0 : between(-0.15, 0.15) * kKappa / 4;
+    Mixer mixer = mixer_of(i % 3 == 0 ? shape_x() : shape_t(), curvature);
+    (void)mixer.set_layout(layout_of(i % 3 == 0 ? shape_x() : shape_t()), {between(1, 1.5), between(1, 1.5), 1, 1});
+    const double yaw = between(-0.1, 0.1);
+    const MixedThrusts mixed = mixer.mix(wrench(between(0, 20), between(-.6, .6), between(-.6, .6), yaw),
+                                         limits(0, between(2, 6)), NewtonMetres(between(0, .02)));
+    const double rounding = mixed.steps == 0 ? 1e-6 : 1e-9;  // ten iterations of κ where all could be met
+    ASSERT_GE(mixed.achieved.yaw.value(), std::min(yaw, 0.0) - rounding);
+    ASSERT_LE(mixed.achieved.yaw.value(), std::max(yaw, 0.0) + rounding);
+    short_of_roll += mixed.concessions.has(Concession::roll_pitch);
+    most_steps = std::max(most_steps, mixed.steps);
+  }
+  EXPECT_GT(short_of_roll, 10'000);
+  EXPECT_LE(most_steps, 100);
+  RecordProperty("most_steps", most_steps);
+}
+
+TEST(Mixer, OfThreeRotorsMakesThrustRollAndPitchAndLetsYawComeAsItComes) {
+  RotorLayout layout{{at(.1, .17), at(.1, -.17), at(-.2, 0)}, {1, 1, -1}};
+  const Mixer mixer = Mixer::build(layout, {Metres(kKappa), 0.0}).value();
+  EXPECT_FALSE(mixer.yaws());
+  const MixedThrusts mixed =
+      mixer.mix(wrench(9, 0.1, -0.1, 0.02), {Rotors<Newtons>(3), Rotors<Newtons>(3, Newtons(6))});
+  EXPECT_NEAR(mixed.achieved.thrust.value(), 9, 1e-12);
+  expect_roll_pitch(mixed, 0.1, -0.1);
+  EXPECT_EQ(mixed.concessions.bits(), static_cast<unsigned>(Concession::yaw));
+}
+
+TEST(Mixer, OfMoreThanFourRotorsAsksForTheLeastThrusts) {
+  RotorLayout layout{Rotors<HubPosition>(6), {1, -1, 1, -1, 1, -1}};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double angle = kPi / 3 * static_cast<double>(i);
+    layout.hubs[i] = at(0.2 * std::cos(angle), 0.2 * std::sin(angle));
+  }
+  const Mixer mixer = Mixer::build(layout, {Metres(kKappa), 0.0}).value();
+  const Rotors<Newtons> room(6, Newtons(9));
+  const MixedThrusts mixed = mixer.mix(wrench(12, 0.1, 0.2, 0.01), {Rotors<Newtons>(6), room});
+  Eigen::Matrix<double, 4, 6> a;
+  Eigen::Matrix<double, 6, 1> f;
+  for (int i = 0; i < 6; ++i) {
+    const auto u = static_cast<std::size_t>(i);
+    a.col(i) << 1, layout.hubs[u].y.value(), -layout.hubs[u].x.value(), layout.spins[u] * kKappa;
+    f[i] = mixed.thrusts[u].value();
+  }
+  const Eigen::Vector4d demand(12, 0.1, 0.2, 0.01);
+  EXPECT_LT((f - a.transpose() * (a * a.transpose()).inverse() * demand).norm(), 1e-12);
+  EXPECT_FALSE(Mixer::build({layout.hubs, {1, 1, 1}}, {Metres(kKappa), 0.0})) << "a spin for each";
 }
 
 TEST(Mixer, LetsNoNaNOutWhateverGoesIn) {

@@ -126,7 +126,7 @@ TEST(Properties, EveryArmSeesTheSamePhiAtTheSameAngle) {
       ASSERT_EQ(compensator.occlusion_angles()[arm], compensator.occlusion_angles()[0]);
       // The same by way of the body's own frame, turned by quarters and mirrored.
       const HubPosition hub = hub_in_body(airframe, arm, theta);
-      const double in_body = occlusion_beside_body(airframe, hub).value();
+      const double in_body = occlusion_beside_body(airframe, arm, hub).value();
       ASSERT_NEAR(in_body, compensator.occlusion_angles()[arm].value(), 1e-7);
     }
   }

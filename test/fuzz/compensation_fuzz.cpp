@@ -74,7 +74,7 @@ Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
     corners[i] = {Metres(0.1 * std::cos(direction)), Metres(0.1 * std::sin(direction))};
   }
   if (const auto outline = ConvexPolygon::from(corners, count)) {
-    frame.polygon = PolygonBody{*outline, {}};
+    frame.polygon = PolygonBody{*outline, Rotors<Hinge>(4)};
     for (Hinge& hinge : frame.polygon->hinges) {
       hinge = {{Metres(bytes.number(0.2)), Metres(bytes.number(0.2))}, Radians(bytes.number(7)), kind % 3 == 0};
     }

@@ -22,6 +22,7 @@ inline const std::vector<Room>& rooms() {
       {"compensation", {}},
       {"compensation/file", {"compensation"}},
       {"compensation/flight", {"compensation", "base"}},
+      {"compensation/integrations", {"compensation"}},
       {"profiles", {"base", "compensation"}},
 
       {"drivers/serial", {"base"}},

@@ -94,7 +94,8 @@ TEST(Shadow, OfEachArmIsThatOfItsOwnHinge) {
     EXPECT_NEAR(mirrored.arc(arm, from_degrees(170)), example_shadow().arc(0, from_degrees(170)), 1e-9) << arm;
   }
   // Half of a long body, its front arms hinged far from its middle.
-  airframe.polygon = compensation::PolygonBody{ConvexPolygon::square(Metres(0.045)), {}};
+  airframe.polygon =
+      compensation::PolygonBody{ConvexPolygon::square(Metres(0.045)), compensation::Rotors<compensation::Hinge>(4)};
   for (std::size_t i = 0; i < 4; ++i) {
     airframe.polygon->hinges[i] = {{Metres(i < 2 ? 0.3 : 0.045), Metres(0.045)}, Radians(0), false};
   }

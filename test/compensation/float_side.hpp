@@ -1,0 +1,27 @@
+// The library compiled in float, behind plain numbers, so that a test can hold it against the one in double.
+#pragma once
+
+#include <cstdint>
+
+namespace kphi::test {
+
+/// A vehicle on a square body, its shape, and what is demanded; [SI].
+struct Vehicle {
+  float half_side, arm_length, propeller_radius, fastest_speed;
+  float thrust_coefficient, intercept, slope_per_rad;
+  int overlap, law;
+  float arms[4];
+  float demand[4];  ///< thrust, roll, pitch, yaw
+  float assured_yaw;
+};
+
+struct Flown {
+  bool built;
+  float speeds[4], thrusts[4], occlusions[4], thrust_max[4], achieved[4];
+  std::uint16_t flags[4], concessions;
+};
+
+/// Builds, sets the arms, mixes for hubs about a centre of gravity of four equal masses, and asks for the speeds.
+[[gnu::visibility("default")]] Flown flown_in_float(const Vehicle& vehicle);
+
+}  // namespace kphi::test

@@ -1,0 +1,163 @@
+// The child of PX4's ActuatorEffectiveness and the mixer in C, flown on the default vehicle.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+
+#include "compensation/integrations/px4_morphing_rotors.hpp"
+
+extern "C" {
+#include "compensation/integrations/morphing_mixer.h"
+}
+
+namespace {
+
+constexpr float kPi = 3.14159265F, kDrag = 0.0133F, kFastest = 2000.0F, kCoefficient = 1.55e-6F;
+constexpr float kFull = kCoefficient * kFastest * kFastest;
+constexpr float kX[4] = {kPi / 4, kPi / 4, kPi / 4, kPi / 4}, kO[4] = {kPi, kPi, kPi - 0.25F, kPi}, kStill[4] = {};
+
+morphingVehicle_t vehicle() {
+  morphingVehicle_t made{};
+  made.airframe.half_side = 0.045F;
+  made.airframe.arm_length = 0.117F;
+  made.airframe.propeller_radius = 0.0635F;
+  made.airframe.fastest_speed = kFastest;
+  made.masses.body = 0.42F;
+  made.dragPerNewton = kDrag;
+  made.fullThrust = kFull;
+  made.thrustCurve = 1;
+  for (int i = 0; i < 4; ++i) {
+    made.airframe.hinge_turns[i] = i;
+    made.masses.at_hubs[i] = 0.045F;
+    made.spins[i] = i % 2 == 0 ? 1 : -1;
+    made.lines[i] = {kCoefficient, 1.03F * kCoefficient, -0.1655F * kCoefficient, 4.7F, KPHI_RIM_ARC, 0, 0, 0, 0, 0};
+  }
+  return made;
+}
+
+/// What the rotors really do: T_i = throttle_i² K_T k_i ω_max², drag torque κ K_T ω², as wrench up, forward and left.
+Eigen::Vector4f wrench_of(const kphi_compensator& compensator, const morphingVehicle_t& of, const float* throttle) {
+  float hubs[4][2], k[4];
+  kphi_hubs(&compensator, &of.masses, hubs);
+  kphi_scaling_factors(&compensator, k);
+  Eigen::Vector4f wrench = Eigen::Vector4f::Zero();
+  for (int i = 0; i < 4; ++i) {
+    const float uncovered = throttle[i] * throttle[i] * kFull, thrust = uncovered * k[i];
+    wrench += Eigen::Vector4f(thrust, thrust * hubs[i][1], -thrust * hubs[i][0],
+                              static_cast<float>(of.spins[i]) * kDrag * uncovered);
+  }
+  return wrench;
+}
+
+void expect_wrench(const Eigen::Vector4f& got, const Eigen::Vector4f& wanted) {
+  EXPECT_LT((got - wanted).norm(), 2e-5F) << got.transpose() << " instead of " << wanted.transpose();
+}
+
+TEST(MorphingMixerInC, GivesTheWrenchInEveryShape) {
+  const morphingVehicle_t of = vehicle();
+  morphingState_t state;
+  ASSERT_EQ(morphingInit(&state, &of, kX), nullptr);
+  float throttle[4];
+  for (const float* shape : {kX, kO}) {
+    morphingArms(&state, shape, kStill, 0);
+    ASSERT_TRUE(state.shapeFlies);
+    morphingMix(&state, 6, 0.02F, -0.03F, 0.005F, throttle);
+    EXPECT_EQ(state.conceded, 0u);
+    EXPECT_EQ(state.flags, 0u);
+    expect_wrench(wrench_of(state.compensator, of, throttle), {6, 0.02F, -0.03F, 0.005F});
+  }
+  morphingMix(&state, 60, 0, 0, 0, throttle);
+  EXPECT_EQ(state.conceded & static_cast<unsigned>(KPHI_GAVE_THRUST), static_cast<unsigned>(KPHI_GAVE_THRUST));
+  for (const float one : throttle) EXPECT_LE(one, 1);
+}
+
+TEST(MorphingMixerInC, SaysInWordsWhyAVehicleCannotBeFlown) {
+  morphingVehicle_t of = vehicle();
+  of.airframe.arm_length = 0.05F;
+  morphingState_t state;
+  EXPECT_NE(std::string(morphingInit(&state, &of, kX)).find("arm"), std::string::npos);
+  of = vehicle();
+  of.spins[1] = 1;
+  of.spins[2] = -1;
+  EXPECT_NE(std::string(morphingInit(&state, &of, kX)).find("spins"), std::string::npos);
+}
+
+class Px4 : public testing::Test {
+ protected:
+  Px4() {
+    morphingState_t state;
+    EXPECT_EQ(morphingInit(&state, &of, kX), nullptr);
+    compensator = state.compensator;
+    rotors.emplace(compensator, of.masses, 4, of.spins, kFull, kDrag);
+  }
+  void arms(const float* angles) {
+    rotors->armsMeasured(angles, kStill, 0);
+    kphi_set_arms(&compensator, angles);
+  }
+  bool update(EffectivenessUpdateReason reason = EffectivenessUpdateReason::NO_EXTERNAL_UPDATE) {
+    ActuatorEffectiveness::Configuration fresh;
+    if (!rotors->getEffectivenessMatrix(fresh, reason)) return false;
+    configuration = fresh;
+    return true;
+  }
+  /// What PX4's allocation makes of a wrench in its frame (y right, z down), then the update of the set-point.
+  void allocate(float thrust, float roll, float pitch, float yaw) {
+    Eigen::Matrix4f matrix;
+    for (int i = 0; i < 4; ++i) {
+      const auto& effectiveness = configuration.effectiveness_matrices[0];
+      matrix.col(i) << effectiveness(5, i), effectiveness(0, i), effectiveness(1, i), effectiveness(2, i);
+    }
+    const Eigen::Vector4f outputs = matrix.inverse() * Eigen::Vector4f(-thrust, roll, -pitch, -yaw);
+    ActuatorEffectiveness::ActuatorVector set_point, lowest, highest;
+    for (int i = 0; i < 4; ++i) {
+      set_point(i) = outputs[i];
+      highest(i) = 1;
+    }
+    rotors->updateSetpoint({}, 0, set_point, lowest, highest);
+    for (int i = 0; i < 4; ++i) throttle[i] = std::sqrt(set_point(i));  // THR_MDL_FAC = 1
+  }
+
+  morphingVehicle_t of = vehicle();
+  kphi_compensator compensator{};
+  std::optional<ActuatorEffectivenessMorphing> rotors;
+  ActuatorEffectiveness::Configuration configuration;
+  float throttle[4]{};
+};
+
+TEST_F(Px4, MakesTheMatrixOfTheShape) {
+  for (const float* shape : {kX, kO}) {
+    arms(shape);
+    ASSERT_TRUE(update());
+    EXPECT_EQ(configuration.num_actuators[0], 4);
+    allocate(6, 0.02F, -0.03F, 0.005F);
+    expect_wrench(wrench_of(compensator, of, throttle), {6, 0.02F, -0.03F, 0.005F});
+    EXPECT_EQ(rotors->flags(), 0u);
+  }
+}
+
+TEST_F(Px4, KeepsItsThrustsBetweenTwoMatrices) {
+  const float nearly_o[4] = {kPi - 0.1F, kPi - 0.1F, kPi - 0.35F, kPi - 0.1F};
+  arms(nearly_o);
+  ASSERT_TRUE(update());
+  arms(kO);  // and PX4 does not ask for a matrix yet
+  allocate(6, 0, 0, 0);
+  EXPECT_NEAR(wrench_of(compensator, of, throttle)[0], 6, 1e-4);
+}
+
+TEST_F(Px4, HasNothingNewWhereNoArmMoved) {
+  arms(kX);
+  ASSERT_TRUE(update());
+  EXPECT_FALSE(update());
+  EXPECT_TRUE(update(EffectivenessUpdateReason::CONFIGURATION_UPDATE));
+}
+
+TEST_F(Px4, TellsTheFlagsOfItsArms) {
+  const float degrees[4] = {45, 45, 45, 45};
+  arms(kX);
+  ASSERT_TRUE(update());
+  arms(degrees);
+  allocate(6, 0, 0, 0);
+  EXPECT_EQ(rotors->flags(), static_cast<unsigned>(KPHI_ARM_ANGLE_BEYOND));
+}
+
+}  // namespace

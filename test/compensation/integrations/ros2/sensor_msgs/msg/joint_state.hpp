@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "rclcpp/rclcpp.hpp"
+
+namespace sensor_msgs::msg {
+
+struct JointState {
+  using ConstSharedPtr = std::shared_ptr<const JointState>;
+  struct Header {
+    rclcpp::Time stamp;
+  } header;
+  std::vector<double> position, velocity;
+};
+
+}  // namespace sensor_msgs::msg
