@@ -18,6 +18,7 @@
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
 #include "profiles/vehicle.hpp"
+#include "profiles/world.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -123,6 +124,17 @@ std::string summary_of(const Vehicle& vehicle) {
       to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
 }
 
+std::string summary_of(const profiles::World& world) {
+  const flight::Truth& truth = world.truth;
+  return fmt::format(
+      "  air        K_T {:.4g} N/RPM2, loss {}, gamma {:g}\n"
+      "  vehicle    {:g} times its mass, centre of gravity {:+g} {:+g} mm off\n"
+      "  arms       lag {:g} s, backlash {:.3g}°, told {:g} s late\n",
+      to_newtons_per_rpm2(truth.thrust_coefficient), name_of(truth.law), truth.gamma, truth.mass,
+      1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y(), truth.arms.lag_s, to_degrees(Radians(truth.arms.backlash)),
+      truth.arms.feedback_delay_s);
+}
+
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
 std::string uncertainty_of(const compensation::Coefficients& file) {
   const compensation::ThrustCurve& curve = file.curve;
@@ -195,6 +207,8 @@ const std::vector<Kind>& kinds() {
       ours(FileKind::answers,
            [](Text text, File file) { return summary_of(file.answers.emplace(parse_answers(text, file.path))); },
            {"mountings"}),
+      ours(FileKind::world, [](Text text, File file) { return summary_of(profiles::parse_world(text, file.path)); },
+           {"k_t_n_per_rpm2", "loss_law"}),
       {"coefficients", compensation::kCoefficientFormat,
        [](Text, File file) { return summary_of(load_sealed_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",

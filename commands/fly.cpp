@@ -6,8 +6,11 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "compensation/compensator.hpp"
+#include "compensation/flight/reproduction.hpp"
 #include "compensation/flight/tables.hpp"
+#include "compensation/flight/verdict.hpp"
 #include "fit/report/gnuplot.hpp"
+#include "profiles/world.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -19,6 +22,7 @@ namespace fs = std::filesystem;
 struct FlyRequest {
   std::string coefficients;
   std::string vehicle;
+  std::string world;
   std::string experiment;
   std::size_t draws = 0;
   std::uint64_t seed = 1;
@@ -31,7 +35,9 @@ struct FlyRequest {
 struct Flown {
   Scene nominal;
   NineFlights flights;
+  NineFlights on_bench;  ///< as much lost as on the bench: γ = 1
   std::vector<Draw> draws;
+  std::vector<CogSign> signs;
 };
 
 void require_section(const profiles::Vehicle& file, bool is_given, const char* section) {
@@ -56,6 +62,14 @@ flight::Vehicle vehicle_of(const profiles::Vehicle& file) {
   return vehicle;
 }
 
+Truth world_of(const FlyRequest& request, const flight::Vehicle& vehicle) {
+  if (request.world.empty()) return assumed_world(vehicle);
+  const profiles::World world = profiles::load_world(request.world);
+  Truth truth = world.truth;
+  if (!world.drag) truth.drag = vehicle.build.air_drag_per_s;
+  return truth;
+}
+
 Scene nominal_of(const FlyRequest& request) {
   const profiles::Vehicle file = profiles::load_vehicle(request.vehicle);
   const compensation::ThrustCurve curve = load_curve_for(request.coefficients, file);
@@ -69,6 +83,7 @@ Scene nominal_of(const FlyRequest& request) {
                              ": its rotors cannot make every torque in X and in O; check shapes_deg and "
                              "rotor_spins (two of them 1, two -1, neighbours unlike)");
   }
+  const Truth world = world_of(request, vehicle);
   const double hover = kGravity * vehicle.build.mass_kg / 4;
   if (built.compensator->thrust_max()[0].value() < 1.5 * hover) {
     throw ConfigurationError(fmt::format(
@@ -76,7 +91,7 @@ Scene nominal_of(const FlyRequest& request) {
         "speed_max_rpm",
         request.coefficients, built.compensator->thrust_max()[0].value(), vehicle.build.mass_kg, hover));
   }
-  return nominal_scene(vehicle, *file.control, curve, request.seed);
+  return nominal_scene(vehicle, *file.control, curve, world, request.seed);
 }
 
 void make_folder(const std::string& path) {
@@ -100,6 +115,17 @@ void write_out(const FlyRequest& request, const Flown& flown, const std::array<s
     write_output(folder / (name + ".csv"), trace_csv(traces[i]));
     skipped = write_figure(folder, name, error_figure(kExperiments[i], traces[i]));
   }
+  const struct {
+    const char *name, *title;
+    ExperimentIndex plain, compensated;
+  } pairs[] = {{"hover_compared", "Hover: X, O, X", kHoverPlain, kHoverCompensated},
+               {"level_compared", "Level circle: X, O", kLevelPlain, kLevelCompensated},
+               {"rising_compared", "Rising circle: X, O", kRisingPlain, kRisingCompensated}};
+  for (const auto& [name, title, plain, compensated] : pairs) {
+    if (traces[plain].empty() || traces[compensated].empty()) continue;
+    skipped =
+        write_figure(folder, name, comparison_figure(title, kExperiments[plain], traces[plain], traces[compensated]));
+  }
   if (!flown.draws.empty()) {
     write_output(folder / "draws.csv", draws_csv(flown.draws));
     skipped = write_figure(folder, "draws", draws_figure(flown.draws));
@@ -108,44 +134,71 @@ void write_out(const FlyRequest& request, const Flown& flown, const std::array<s
 }
 
 Flown fly_requested(const FlyRequest& request) {
-  Flown flown{nominal_of(request), {}, {}};
+  Flown flown{nominal_of(request), {}, {}, {}, {}};
+  Scene on_bench = flown.nominal;
+  on_bench.truth.gamma = 1;
   const Shadow shadow(flown.nominal.vehicle.airframe);
   std::array<std::vector<TraceRow>, 9> traces;
   if (!request.out.empty()) make_folder(request.out);
   for (std::size_t i = 0; i < kExperiments.size(); ++i) {
     if (!request.experiment.empty() && request.experiment != kExperiments[i].name) continue;
     flown.flights[i] = fly_one(i, flown.nominal, shadow, request.out.empty() ? nullptr : &traces[i]);
+    flown.on_bench[i] = fly_one(i, on_bench, shadow);
   }
   const std::size_t threads = request.threads > 0 ? request.threads : std::max(1u, std::thread::hardware_concurrency());
   flown.draws = fly_draws(flown.nominal, shadow, request.draws, threads);
+  if (request.experiment.empty()) flown.signs = signs_of_cog(flown.nominal, shadow);
   if (!request.out.empty()) write_out(request, flown, traces);
   return flown;
+}
+
+std::array<double, 4> percent_off(const std::array<double, 4>& shares) {
+  std::array<double, 4> off{};
+  for (std::size_t i = 0; i < off.size(); ++i) off[i] = 100 * (shares[i] - 1);
+  return off;
 }
 
 std::string circumstances(const FlyRequest& request, const Scene& scene) {
   const Truth& truth = scene.truth;
   const compensation::ThrustCurve& curve = scene.curve;
   const auto share = [&](Radians phi) { return curve.at(phi) / curve.thrust_coefficient(); };
-  std::string errors;
-  for (const double factor : truth.thrust) errors += fmt::format(" {:+.0f}", 100 * (factor - 1));
+  const std::string off = fmt::format(
+      "mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm", 100 * (truth.mass - 1),
+      fmt::join(percent_off(truth.thrust), " "), 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
   return fmt::format(
       "The controller flies with K_T {:.4e} N/(rad/s)^2 and k/K_T from {:.4f} at 0° to {:.4f} at {:g}° ({}).\n"
-      "It does not know that the air follows the loss model \"{}\", gamma = {:g} times as on the bench (gamma is "
-      "fitted\nto the paper's hover height alone), nor these errors: mass {:+.1f} %, K_T of the rotors{} %, centre of "
-      "gravity\n{:+.1f} {:+.1f} mm. Seed {}.\n\n",
+      "The air, which it does not know: K_T {:.4e} N/(rad/s)^2 ({}), loss \"{}\", gamma = {:g} times as on\n"
+      "the bench. The vehicle differs from its file by: {}. Seed {}.\n\n",
       curve.thrust_coefficient().value(), share(Radians(0)), share(curve.largest_fitted()),
-      to_degrees(curve.largest_fitted()), request.coefficients, name_of(truth.law), truth.gamma, 100 * (truth.mass - 1),
-      errors, 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y(), request.seed);
+      to_degrees(curve.largest_fitted()), request.coefficients, truth.thrust_coefficient.value(),
+      request.world.empty() ? "assumed for three blades of this radius; --world FILE tells another" : request.world,
+      name_of(truth.law), truth.gamma, off, request.seed);
+}
+
+/// What was flown, for the verdict: the draws, or the one set of circumstances.
+Findings judged(const Flown& flown) {
+  return findings_of(flown.draws.empty() ? std::vector<Draw>{{flown.nominal, flown.flights}} : flown.draws);
+}
+
+bool all_flown(const Flown& flown) {
+  return std::ranges::all_of(flown.flights, [](const FlightResult& flight) { return flight.leg_count > 0; });
+}
+
+std::vector<PaperCell> cells_of(const Flown& flown) {
+  return paper_cells(flown.on_bench, flown.flights, flown.draws, flown.nominal.pilot.gains);
 }
 
 void print_text(const FlyRequest& request, const Flown& flown) {
-  fmt::print("{}{}{}{}", circumstances(request, flown.nominal), hover_table(flown.flights),
-             height_table(flown.flights, flown.nominal.pilot.gains), forward_table(flown.flights));
+  fmt::print("{}{}", circumstances(request, flown.nominal),
+             reproduction_table(cells_of(flown), flown.nominal.truth.gamma));
+  if (!flown.signs.empty()) fmt::print("{}", cog_table(flown.signs));
   for (std::size_t i = 0; i < flown.flights.size(); ++i) {
     if (flown.flights[i].lost) fmt::print("{}: lost, more than 1 m from its reference\n", kExperiments[i].name);
   }
-  if (!flown.draws.empty()) fmt::print("{}", findings_table(findings_of(flown.draws)));
+  const Findings findings = judged(flown);
+  if (!flown.draws.empty()) fmt::print("{}", findings_table(findings));
   fmt::print("{}", not_reproduced());
+  if (all_flown(flown)) fmt::print("\n{}", words_of(judgement_of(findings), findings));
 }
 
 Json json_of(const Findings& found) {
@@ -162,6 +215,19 @@ Json json_of(const Findings& found) {
     json["by_loss_law"][name_of(static_cast<LossLaw>(law))] = {{"hover_z_ratio_p50", of.hover_z_ratio},
                                                                {"forward_ratio_p50", of.forward_ratio}};
   }
+  return json;
+}
+
+Json json_of(const PaperCell& cell) {
+  const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
+  Json json{{"row", cell.row},
+            {"what", cell.what},
+            {"paper", cell.paper},
+            {"gamma_1", number(cell.bench)},
+            {"world", number(cell.world)},
+            {"reproduced", name_of(cell.reproduced)},
+            {"draws", cell.draws}};
+  if (cell.draws > 0) json["p10_p50_p90"] = {cell.spread.p10, cell.spread.p50, cell.spread.p90};
   return json;
 }
 
@@ -189,6 +255,15 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
   Json out{{"coefficients", request.coefficients}, {"vehicle", request.vehicle}, {"seed", request.seed},
            {"loss_law", name_of(truth.law)},       {"gamma", truth.gamma},       {"flights", flights}};
   if (!flown.draws.empty()) out["study"] = json_of(findings_of(flown.draws));
+  if (all_flown(flown)) {
+    const Judgement found = judgement_of(judged(flown));
+    out["verdict"] = {{"fitness", name_of(found.fitness)}, {"doubts", found.doubts}};
+  }
+  out["world"] = {{"file", request.world.empty() ? Json() : Json(request.world)},
+                  {"k_t_n_per_rad2_s2", truth.thrust_coefficient.value()},
+                  {"mass_share", truth.mass}};
+  out["paper"] = Json::array();
+  for (const PaperCell& cell : cells_of(flown)) out["paper"].push_back(json_of(cell));
   out["not_reproduced"] = kNotReproduced;
   print_json(out);
 }
@@ -196,7 +271,8 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
 ExitCode fly_as_asked(const FlyRequest& request) {
   const Flown flown = fly_requested(request);
   request.json ? print_flights(request, flown) : print_text(request, flown);
-  return ExitCode::ok;
+  const bool fit = !all_flown(flown) || judgement_of(judged(flown)).fitness == Fitness::fit_to_fly;
+  return fit ? ExitCode::ok : ExitCode::data_rejected;
 }
 
 }  // namespace
@@ -206,8 +282,12 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
       program, exit_code, "fly",
       "fly the paper's nine experiments in simulation with these coefficients, before propellers turn", fly_as_asked);
   command.footer(
-      "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.");
+      "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.\n"
+      "The exit code is 5 where the verdict is that the coefficients are not fit to fly.");
   add_flight_files(command, request.coefficients, request.vehicle);
+  add_value(command, "--world", "FILE", request.world,
+            "the air and what the vehicle differs by, which the controller never reads (profiles/world_example.yaml; "
+            "default: K_T 1.7e-8 N/RPM² at 5 inches, no error)");
   std::vector<std::string> names;
   for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
   add_value(command, "--experiment", "NAME", request.experiment,

@@ -10,7 +10,7 @@
 
 namespace kphi::profiles {
 
-enum class FileKind { campaign, bench, vehicle, answers };
+enum class FileKind { campaign, bench, vehicle, answers, world };
 
 struct FileKindInfo {
   FileKind kind;
@@ -18,11 +18,12 @@ struct FileKindInfo {
   const char* format;  ///< value of the key `format`
 };
 
-inline constexpr std::array<FileKindInfo, 4> kFileKinds{{
+inline constexpr std::array<FileKindInfo, 5> kFileKinds{{
     {FileKind::campaign, "campaign", "kphi-campaign/1"},
     {FileKind::bench, "bench", "kphi-bench/1"},
     {FileKind::vehicle, "vehicle", "kphi-vehicle/1"},
     {FileKind::answers, "answers", "kphi-answers/1"},
+    {FileKind::world, "world", "kphi-world/1"},
 }};
 
 [[nodiscard]] constexpr const FileKindInfo& info(FileKind kind) { return kFileKinds[static_cast<std::size_t>(kind)]; }

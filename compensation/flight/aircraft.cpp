@@ -7,9 +7,8 @@ Eigen::Vector3d flat(const Eigen::Vector2d& v) noexcept { return {v.x(), v.y(), 
 
 }  // namespace
 
-Aircraft::Aircraft(const Vehicle& vehicle, const Truth& truth, ThrustCoefficient thrust_coefficient,
-                   const Shadow& shadow) noexcept
-    : vehicle_(vehicle), truth_(truth), thrust_coefficient_(thrust_coefficient.value()), shadow_(&shadow) {
+Aircraft::Aircraft(const Vehicle& vehicle, const Truth& truth, const Shadow& shadow) noexcept
+    : vehicle_(vehicle), truth_(truth), shadow_(&shadow) {
   vehicle_.build.mass_kg *= truth.mass;
   vehicle_.build.hub_mass_kg *= truth.mass;
 }
@@ -22,7 +21,7 @@ Configuration Aircraft::configuration(const Angles& arms, const std::array<doubl
   Configuration found;
   found.mass = mass_properties(vehicle_, true_arms, rates, truth_.cog_error * (build.mass_kg / plate));
   for (std::size_t i = 0; i < arms.size(); ++i) {
-    const double uncovered = thrust_coefficient_ * truth_.thrust[i];
+    const double uncovered = truth_.thrust_coefficient.value() * truth_.thrust[i];
     found.thrust_per_square[i] =
         uncovered * thrust_share_in_flight(truth_.law, truth_.gamma, *shadow_, i, true_arms[i]);
     found.torque_per_square[i] = build.spin[i] * build.yaw_arm_m * uncovered;

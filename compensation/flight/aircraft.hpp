@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
+#include "compensation/flight/arms.hpp"
 #include "compensation/flight/shadow.hpp"
 #include "compensation/flight/simulated_vehicle.hpp"
 
@@ -14,16 +15,20 @@ namespace kphi::flight {
 
 inline constexpr double kGravity = 9.80665;  // m/s²
 
-/// In what the world differs from what the controller believes.
+/// The world, which the controller never reads: the air, and in what the vehicle differs from its file.
 struct Truth {
+  ThrustCoefficient thrust_coefficient = from_newtons_per_rpm2(1.7e-8);  ///< of an uncovered rotor without error
   LossLaw law = LossLaw::quadratic;
-  double gamma = 1.4;                                      ///< loss in flight over loss on the bench
-  double mass = 1.01;                                      ///< times the nominal mass
-  std::array<double, 4> thrust{{1.01, 0.99, 1.00, 1.01}};  ///< times K_T, per rotor
-  std::array<double, 4> arm_error{};                       ///< rad, added to what the servos are told
-  Eigen::Vector2d cog_error{1e-3, -0.5e-3};                ///< m
-  double drag = 0;                                         ///< 1/s: force per mass and air speed
-  Eigen::Vector3d wind{0, 0, 0};                           ///< m/s
+  double gamma = 1.4;                          ///< loss in flight over loss on the bench
+  double mass = 1;                             ///< times the nominal mass
+  std::array<double, 4> thrust{{1, 1, 1, 1}};  ///< times K_T, per rotor
+  std::array<double, 4> arm_error{};           ///< rad, added to what the servos are told
+  Eigen::Vector2d cog_error{0, 0};             ///< m
+  double drag = 0;                             ///< 1/s: force per mass and air speed
+  Eigen::Vector3d wind{0, 0, 0};               ///< m/s
+  ArmHardware arms{};
+  double estimate_delay_s = 0;              ///< age of the position and velocity that the controller is told
+  std::array<int, 4> wiring{{0, 1, 2, 3}};  ///< which arm's angle the controller takes for arm i's
 };
 
 /// Position and velocity of the centre of gravity [m, m/s], attitude quaternion (w, x, y, z) body to world, angular
@@ -52,9 +57,8 @@ struct Configuration {
 
 class Aircraft {
  public:
-  /// `thrust_coefficient` is K_T of a rotor without errors. Keeps a reference to `shadow`.
-  Aircraft(const Vehicle& vehicle, const Truth& truth, ThrustCoefficient thrust_coefficient,
-           const Shadow& shadow) noexcept;
+  /// Keeps a reference to `shadow`.
+  Aircraft(const Vehicle& vehicle, const Truth& truth, const Shadow& shadow) noexcept;
 
   /// With the arms where the servos are told to be (the truth's errors come on top), moving at `rates` [rad/s].
   [[nodiscard]] Configuration configuration(const Angles& arms, const std::array<double, 4>& rates) const noexcept;
@@ -72,7 +76,6 @@ class Aircraft {
  private:
   Vehicle vehicle_;
   Truth truth_;
-  double thrust_coefficient_;
   const Shadow* shadow_;
 };
 

@@ -51,22 +51,25 @@ struct Flight {
   const Scene& scene_;
   const Shadow& shadow_;
   std::vector<TraceRow>* trace_;
-  Aircraft plant_{scene_.vehicle, scene_.truth, scene_.curve.thrust_coefficient(), shadow_};
+  Aircraft plant_{scene_.vehicle, scene_.truth, shadow_};
   Pilot pilot_ = pilot_for(scene_);
   Estimator estimator_{scene_.noise, kStep* kStepsPerTick, Random(scene_.seed)};
-  ArmMotion motion_{scene_.vehicle.angles(experiment_.legs[0].shape), scene_.vehicle.build.morph_s};
-  Configuration now_ = plant_.configuration(motion_.angles(0), {});
+  Arms arms_{scene_.vehicle.angles(experiment_.legs[0].shape), scene_.vehicle.build.morph_s, scene_.truth.arms, kStep};
+  Configuration now_ = plant_.configuration(arms_.hubs(), {});
   AircraftState state_{};
   Reference reference_{};
   BodyMotion estimate_{};
+  Angles told_ = arms_.hubs();                        ///< what the controller was told of the arms
+  Eigen::Vector4d speeds_ = Eigen::Vector4d::Zero();  ///< what it asked for [rad/s]
+  std::array<BodyMotion, 32> estimates_{};            ///< a ring, for the delay
   long step_ = 0;
   std::size_t leg_ = 0;
 
   FlightResult run() {
     const Reference start = reference_at(experiment_.path, 0);
-    const double hover = kGravity * scene_.vehicle.build.mass_kg / 4 / scene_.curve.thrust_coefficient().value();
+    const double hover = kGravity * scene_.vehicle.build.mass_kg / 4 / scene_.truth.thrust_coefficient.value();
     state_ = level_state({start.position, start.velocity}, now_.mass, std::sqrt(hover));
-    pilot_.set_arms(motion_.angles(0));
+    pilot_.set_arms(arms_.hubs());
     FlightResult result;
     result.leg_count = experiment_.leg_count;
     for (leg_ = 0; leg_ < experiment_.leg_count && !result.lost; ++leg_) {
@@ -88,7 +91,7 @@ struct Flight {
   bool fly_leg(LegResult& result) {
     const Leg& leg = experiment_.legs[leg_];
     const Angles& goal = scene_.vehicle.angles(leg.shape);
-    if (leg_ > 0 && goal != motion_.angles(seconds())) motion_.begin(goal, seconds());
+    if (leg_ > 0 && goal != arms_.goal()) arms_.begin(goal);
     pilot_.compensate(leg.compensated);
     const long begins = step_, ends = begins + std::lround(leg_seconds(experiment_.path) / kStep);
     const long counts_from = begins + std::lround(settle_seconds(experiment_.path) / kStep);
@@ -114,25 +117,34 @@ struct Flight {
   void tick() {
     reference_ = reference_at(experiment_.path, seconds());
     const BodyMotion truth = body_motion(state_, now_.mass);
-    estimate_ = estimator_.estimate(truth);
+    const auto tick = static_cast<std::size_t>(step_ / kStepsPerTick);
+    const auto late =
+        std::min(static_cast<std::size_t>(std::lround(scene_.truth.estimate_delay_s / (kStep * kStepsPerTick))),
+                 std::min(tick, estimates_.size() - 1));
+    estimates_[tick % estimates_.size()] = estimator_.estimate(truth);
+    estimate_ = estimates_[(tick - late) % estimates_.size()];
     pilot_.look(reference_, estimate_, state_.attitude());
     if (trace_ != nullptr) trace_->push_back(row(truth));
   }
 
   void advance() noexcept {
-    pilot_.set_arms(motion_.angles(seconds()));
-    const Eigen::Vector4d speeds = pilot_.act(body_rates(state_, now_.mass));
-    if (!motion_.moving(seconds())) {
-      state_ = plant_.step(state_, kStep, {&now_, &now_, &now_}, speeds);
+    const Angles told = arms_.tell();
+    for (std::size_t i = 0; i < told.size(); ++i) told_[i] = told[static_cast<std::size_t>(scene_.truth.wiring[i])];
+    pilot_.set_arms(told_);
+    speeds_ = pilot_.act(body_rates(state_, now_.mass));
+    if (!arms_.moving()) {
+      arms_.advance(seconds() + kStep);
+      state_ = plant_.step(state_, kStep, {&now_, &now_, &now_}, speeds_);
       return;
     }
     const Configuration middle = configuration_at(seconds() + kStep / 2), end = configuration_at(seconds() + kStep);
-    state_ = plant_.step(state_, kStep, {&now_, &middle, &end}, speeds);
+    state_ = plant_.step(state_, kStep, {&now_, &middle, &end}, speeds_);
     now_ = end;
   }
 
-  [[nodiscard]] Configuration configuration_at(double time) const noexcept {
-    return plant_.configuration(motion_.angles(time), motion_.rates(time));
+  [[nodiscard]] Configuration configuration_at(double time) noexcept {
+    arms_.advance(time);
+    return plant_.configuration(arms_.hubs(), arms_.rates());
   }
 
   [[nodiscard]] TraceRow row(const BodyMotion& truth) const noexcept {
@@ -143,14 +155,19 @@ struct Flight {
     found.estimate = estimate_.position;
     found.truth = truth.position;
     found.rotation = roll_pitch_yaw(state_.attitude());
-    const Angles arms = motion_.angles(seconds());
+    const Angles& arms = arms_.hubs();
     const auto& compensator = pilot_.compensator();
     for (std::size_t i = 0; i < 4; ++i) {
-      found.arm_angles[i] = arms[i].value();
-      found.occlusions[i] = compensator.occlusion_angles()[i].value();
+      const auto rotor = static_cast<Eigen::Index>(i);
+      found.arms[i] = arms[i].value() + scene_.truth.arm_error[i];
+      found.arms_told[i] = told_[i].value();
+      found.occlusions[i] = shadow_.arc(i, Radians(found.arms[i]));
+      found.occlusions_believed[i] = compensator.occlusion_angles()[i].value();
       found.scaling[i] = compensator.scaling_factors()[i];
-      found.thrusts[i] = pilot_.thrusts()[i].value();
-      found.speeds[i] = state_.rotors()[static_cast<Eigen::Index>(i)];
+      found.thrusts_asked[i] = i < pilot_.thrusts().size() ? pilot_.thrusts()[i].value() : 0.0;
+      found.speeds_asked[i] = speeds_[rotor];
+      found.speeds[i] = state_.rotors()[rotor];
+      found.thrusts[i] = now_.thrust_per_square[i] * found.speeds[i] * found.speeds[i];
     }
     return found;
   }

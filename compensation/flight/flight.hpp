@@ -121,9 +121,14 @@ struct FlightResult {
 struct TraceRow {
   double time;  ///< s
   std::size_t leg;
-  Eigen::Vector3d reference, estimate, truth;                              ///< m
-  Eigen::Vector3d rotation;                                                ///< roll, pitch, yaw [rad]
-  std::array<double, 4> arm_angles, occlusions, scaling, thrusts, speeds;  ///< rad, rad, 1, N, rad/s
+  Eigen::Vector3d reference, estimate, truth;  ///< m
+  Eigen::Vector3d rotation;                    ///< roll, pitch, yaw [rad]
+  std::array<double, 4> arms, arms_told;       ///< rad: where the hubs are, and what the controller was told
+  std::array<double, 4> occlusions,
+      occlusions_believed;                       ///< rad: φ by the rim arc as it is, and as the controller knows it
+  std::array<double, 4> scaling;                 ///< k_i
+  std::array<double, 4> thrusts_asked, thrusts;  ///< N: of the mixer, and of the rotors
+  std::array<double, 4> speeds_asked, speeds;    ///< rad/s
 };
 
 /// Throws std::invalid_argument if the pilot cannot be built for the vehicle. Allocates nothing while it flies unless

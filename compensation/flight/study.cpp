@@ -38,13 +38,13 @@ Angles with_margin(const Angles& arms, double factor) {
 }
 
 void draw_truth(Truth& truth, Random& random) {
-  truth.gamma = random.uniform(1.0, 1.5);
-  truth.mass = random.normal(1.0, 0.015);
-  for (double& factor : truth.thrust) factor = random.normal(1.0, 0.01);
-  for (double& error : truth.arm_error) error = random.normal(0.0, 0.02);
-  for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] = random.normal(0.0, 1.5e-3);
+  truth.gamma = std::max(0.0, truth.gamma + random.uniform(-0.4, 0.1));
+  truth.mass *= random.normal(1.0, 0.015);
+  for (double& factor : truth.thrust) factor *= random.normal(1.0, 0.01);
+  for (double& error : truth.arm_error) error += random.normal(0.0, 0.02);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] += random.normal(0.0, 1.5e-3);
   truth.drag *= random.uniform(1.0 / 3, 5.0 / 3);
-  for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] = random.normal(0.0, 0.1);
+  for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] += random.normal(0.0, 0.1);
 }
 
 void draw_gains(Gains& gains, Random& random) {
@@ -56,10 +56,18 @@ void draw_gains(Gains& gains, Random& random) {
 
 }  // namespace
 
-Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustCurve& curve, std::uint64_t seed) {
-  Scene scene{vehicle, curve, {}, {}, pilot, seed};
-  scene.truth.drag = vehicle.build.air_drag_per_s;
-  return scene;
+Truth assumed_world(const Vehicle& vehicle) {
+  constexpr double kFiveInches = 0.0635;  // m, radius
+  Truth world;
+  world.thrust_coefficient =
+      world.thrust_coefficient * std::pow(vehicle.airframe.propeller_radius.value() / kFiveInches, 4);
+  world.drag = vehicle.build.air_drag_per_s;
+  return world;
+}
+
+Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustCurve& curve, const Truth& world,
+                    std::uint64_t seed) {
+  return {vehicle, curve, world, {}, pilot, seed};
 }
 
 Scene drawn_scene(const Scene& nominal, std::size_t index) {
@@ -92,6 +100,7 @@ Merits merits_of(const NineFlights& flights) noexcept {
     return flights[flight].legs[index];
   };
   Merits merits;
+  merits.hover_z_x = leg(kHoverPlain, 0).mean_error.z();
   merits.hover_z_plain = leg(kHoverPlain, 1).mean_error.z();
   merits.hover_z_compensated = leg(kHoverCompensated, 1).mean_error.z();
   merits.hover_xy_plain = horizontal(leg(kHoverPlain, 1));

@@ -22,21 +22,6 @@ std::string padded(std::string text, std::size_t width) {
   return text;
 }
 
-bool flown(const FlightResult& flight) { return flight.leg_count > 0; }
-bool valid(const FlightResult& flight, std::size_t leg) { return !flight.lost || leg < flight.lost_leg; }
-
-std::string headed(const std::string& head, const std::string& rows) { return rows.empty() ? "" : head + rows + "\n"; }
-
-std::string spread(double mean, double deviation) { return aligned(mean, 3, 6) + " ±" + aligned(deviation, 3, 5); }
-
-std::string forward_cell(const FlightResult& flight, const std::optional<ForwardCell>& cell) {
-  if (!cell) return padded("  -", 31);
-  const std::string paper = "  (" + spread(cell->mean, cell->deviation) + ") ";
-  if (!valid(flight, cell->leg)) return padded("  lost", 14) + paper;
-  const LegResult& leg = flight.legs[cell->leg];
-  return " " + spread(leg.mean_distance, leg.deviation) + paper;
-}
-
 // ---- for other programs ---------------------------------------------------------------------------------------------
 
 constexpr std::size_t kFigureStride = 5;  // 50 ms
@@ -100,62 +85,6 @@ std::string leg_marks(const Experiment& experiment) {
 
 }  // namespace
 
-std::string hover_table(const NineFlights& flights) {
-  std::string rows;
-  for (const HoverRow& row : kHoverRows) {
-    const FlightResult& flight = flights[row.flight];
-    if (!flown(flight)) continue;
-    rows += padded(std::string(row.start), 8) + padded(std::string(row.final), 8);
-    if (valid(flight, row.leg)) {
-      const Eigen::Vector3d& error = flight.legs[row.leg].mean_error;
-      for (Eigen::Index axis = 0; axis < 3; ++axis) rows += aligned(std::fabs(error[axis]), 4, 8);
-      rows += error.z() > 0 ? "  below" : "  above";
-    } else {
-      rows += padded("    lost", 31);
-    }
-    rows += "   ";
-    for (const double error : row.paper) rows += aligned(error, 4, 8);
-    rows += "\n";
-  }
-  return headed(
-      "Table I, hover: |reference - estimate| in the final shape, mean of 4 s [m]\n"
-      "start   final        |x|     |y|     |z|  drone   paper |x|     |y|     |z|\n",
-      rows);
-}
-
-std::string height_table(const NineFlights& flights, const Gains& gains) {
-  std::string rows;
-  for (const HeightRow& row : kHeightRows) {
-    const FlightResult& flight = flights[row.flight];
-    if (!flown(flight) || !valid(flight, row.leg)) continue;
-    const LegResult& leg = flight.legs[row.leg];
-    const double error = leg.mean_error.z(), rate = leg.mean_error_rate.z();
-    rows += padded(std::string(row.start), 8) + padded(std::string(row.final), 8) + aligned(error, 4, 8) +
-            aligned(rate, 4, 8) + aligned(height_demand(gains, error, rate), 3, 13) + "    " +
-            aligned(row.error, 4, 8) + aligned(row.error_rate, 4, 8) + aligned(row.acceleration, 4, 9) +
-            aligned(height_demand(gains, row.error, row.error_rate), 4, 13) + "\n";
-  }
-  return headed("Table II, height: the PD's share of the demand with kP " + shortest(gains.position.z()) + "/s2, kD " +
-                    shortest(gains.velocity.z()) +
-                    "/s; e = z_ref - z_est [m], e' [m/s], e'' [m/s2]\n"
-                    "start   final          e      e'  kP e + kD e'     paper e      e'      e''  kP e + kD e'\n",
-                rows);
-}
-
-std::string forward_table(const NineFlights& flights) {
-  std::string rows;
-  for (const ForwardRow& row : kForwardRows) {
-    const FlightResult& flight = flights[row.flight];
-    if (!flown(flight)) continue;
-    rows += padded(std::string(row.title), 21) + forward_cell(flight, row.x) + forward_cell(flight, row.o_plain) +
-            forward_cell(flight, row.o_compensated) + "\n";
-  }
-  return headed(
-      "Table III, forward flight: distance to the reference over one lap, mean ± standard deviation [m] (paper)\n"
-      "circle               X                              O n.c.                         O c.\n",
-      rows);
-}
-
 std::string findings_table(const Findings& found) {
   const auto percent = [](double share) { return aligned(100 * share, 1, 0) + " %"; };
   if (found.kept == 0) {
@@ -195,11 +124,15 @@ std::string trace_csv(const std::vector<TraceRow>& trace) {
   Csv csv(
       "time_s,leg,reference_x_m,reference_y_m,reference_z_m,estimate_x_m,estimate_y_m,estimate_z_m,x_m,y_m,z_m,"
       "roll_rad,pitch_rad,yaw_rad" +
-      four("arm", "_rad") + four("occlusion", "_rad") + four("k", "") + four("thrust", "_n") + four("speed", "_rad_s"));
+      four("arm", "_rad") + four("arm", "_told_rad") + four("phi", "_rad") + four("phi", "_believed_rad") +
+      four("k_i_", "") + four("thrust", "_asked_n") + four("thrust", "_n") + four("speed", "_asked_rad_s") +
+      four("speed", "_rad_s"));
   for (const TraceRow& row : trace) {
     csv.add(row.time).add(std::to_string(row.leg + 1));
     csv.add_all(row.reference).add_all(row.estimate).add_all(row.truth).add_all(row.rotation);
-    csv.add_all(row.arm_angles).add_all(row.occlusions).add_all(row.scaling).add_all(row.thrusts).add_all(row.speeds);
+    csv.add_all(row.arms).add_all(row.arms_told).add_all(row.occlusions).add_all(row.occlusions_believed);
+    csv.add_all(row.scaling).add_all(row.thrusts_asked).add_all(row.thrusts);
+    csv.add_all(row.speeds_asked).add_all(row.speeds);
     csv.end_row();
   }
   return std::move(csv).text();
@@ -230,6 +163,56 @@ std::string draws_csv(const std::vector<Draw>& draws) {
     csv.end_row();
   }
   return std::move(csv).text();
+}
+
+std::string comparison_figure(const std::string& title, const Experiment& experiment,
+                              const std::vector<TraceRow>& plain, const std::vector<TraceRow>& compensated) {
+  std::string script = terminal(900, 900) + kFigureHead;
+  const auto block = [&](const char* name, const std::vector<TraceRow>& trace) {
+    script += std::string("$") + name + " << EOD\n";
+    for (std::size_t i = 0; i < trace.size(); i += kFigureStride) {
+      const TraceRow& row = trace[i];
+      script += aligned(row.time, 2, 0) + " " + aligned(row.reference.z() - row.truth.z(), 5, 0);
+      for (const std::size_t rotor : {0u, 2u}) {
+        script += " " + aligned(to_degrees(Radians(row.arms[rotor])), 3, 0) + " " +
+                  aligned(to_degrees(Radians(row.occlusions[rotor])), 3, 0) + " " +
+                  aligned(to_degrees(Radians(row.occlusions_believed[rotor])), 3, 0) + " " +
+                  aligned(to_rpm(RadPerSec(row.speeds[rotor])), 1, 0);
+      }
+      script += "\n";
+    }
+    script += "EOD\n";
+  };
+  block("plain", plain);
+  block("compensated", compensated);
+  const double total = static_cast<double>(experiment.leg_count) * leg_seconds(experiment.path);
+  script += "unset key\nset lmargin 11\nset rmargin 2\nset xrange [0:" + shortest(total) +
+            "]\nset multiplot layout 4,1 title '" + title + "'\n";
+  for (std::size_t i = 1; i < experiment.leg_count; ++i) {
+    const std::string at = shortest(static_cast<double>(i) * leg_seconds(experiment.path));
+    script += "set arrow from " + at + ", graph 0 to " + at + ", graph 1 nohead lc rgb '#999999' dt 2\n";
+  }
+  const auto line = [](const char* block_name, int column, const char* colour, const char* dash, const char* name) {
+    return std::string("$") + block_name + " using 1:" + std::to_string(column) + " with lines lc rgb '" + colour +
+           "' dt " + dash + " title '" + name + "'";
+  };
+  constexpr const char *kPlain = "#D55E00", *kHelped = "#0072B2";
+  script +=
+      "set key outside top right horizontal samplen 2\nset ylabel 'below reference [m]'\nplot 0 lc rgb '#bbbbbb' "
+      "notitle, " +
+      line("plain", 2, kPlain, "1", "without compensation") + ", " + line("compensated", 2, kHelped, "1", "with") +
+      "\n";
+  script += "set ylabel 'arm angle [deg]'\nplot " + line("compensated", 3, "#333333", "1", "arm 1") + ", " +
+            line("compensated", 7, "#333333", "2", "arm 3") + "\n";
+  script += "set ylabel 'occlusion [deg]'\nplot " + line("compensated", 4, "#009E73", "1", "rotor 1, true") + ", " +
+            line("compensated", 5, "#555555", "3", "believed") + ", " +
+            line("compensated", 8, "#56B4E9", "1", "rotor 3, true") + ", " +
+            line("compensated", 9, "#555555", "3", "believed") + "\n";
+  script += "set xlabel 'time [s]'\nset ylabel 'speed [RPM]'\nplot " +
+            line("plain", 6, kPlain, "1", "rotor 1 without") + ", " + line("compensated", 6, kHelped, "1", "with") +
+            ", " + line("plain", 10, kPlain, "2", "rotor 3 without") + ", " +
+            line("compensated", 10, kHelped, "2", "with") + "\n";
+  return script + "unset multiplot\n";
 }
 
 std::string error_figure(const Experiment& experiment, const std::vector<TraceRow>& trace) {

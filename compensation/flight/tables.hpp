@@ -74,11 +74,6 @@ inline constexpr std::array<std::string_view, 4> kNotReproduced{{
     "published; the draws show how much",
 }};
 
-/// Flights with no legs were not flown; their rows are left out, and a table without rows is empty.
-[[nodiscard]] std::string hover_table(const NineFlights& flights);
-[[nodiscard]] std::string height_table(const NineFlights& flights, const Gains& gains);
-[[nodiscard]] std::string forward_table(const NineFlights& flights);
-
 [[nodiscard]] std::string findings_table(const Findings& findings);
 [[nodiscard]] std::string not_reproduced();
 
@@ -92,6 +87,12 @@ inline constexpr std::array<std::string_view, 4> kNotReproduced{{
 
 /// One row per draw: what was drawn, and how it flew.
 [[nodiscard]] std::string draws_csv(const std::vector<Draw>& draws);
+
+/// The same flight with compensation and without, in one picture: height error, arm angles, occlusions (true, and what
+/// the controller takes them for) and speeds of rotors 1 and 3.
+[[nodiscard]] std::string comparison_figure(const std::string& title, const Experiment& experiment,
+                                            const std::vector<TraceRow>& plain,
+                                            const std::vector<TraceRow>& compensated);
 
 /// The position error of one flight over time, one axis below the other, as in the paper's figures.
 [[nodiscard]] std::string error_figure(const Experiment& experiment, const std::vector<TraceRow>& trace);

@@ -15,6 +15,7 @@
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
 #include "profiles/vehicle.hpp"
+#include "profiles/world.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::profiles {
@@ -44,11 +45,12 @@ void parse(FileKind kind, const std::string& text) {
   if (kind == FileKind::bench) static_cast<void>(parse_bench(text, "f.yaml"));
   if (kind == FileKind::answers) static_cast<void>(parse_answers(text, "f.yaml"));
   if (kind == FileKind::vehicle) static_cast<void>(parse_vehicle(text, "f.yaml"));
+  if (kind == FileKind::world) static_cast<void>(parse_world(text, "f.yaml"));
 }
 
 TEST(ShippedFiles, AllLoad) {
   const auto paths = shipped_files();
-  EXPECT_EQ(paths.size(), 9u);
+  EXPECT_EQ(paths.size(), 10u);
   for (const std::string& path : paths) {
     const std::string text = read_text(path);
     EXPECT_NO_THROW(parse(kind_of(text), text)) << path;

@@ -30,7 +30,7 @@ struct World {
 
   const Vehicle vehicle = example_vehicle();
   const Truth truth;
-  const Aircraft plant{vehicle, truth, bench_line().thrust_coefficient(), example_shadow()};
+  const Aircraft plant{vehicle, truth, example_shadow()};
   const Configuration x = plant.configuration(vehicle.x, {});
 };
 
@@ -161,7 +161,7 @@ TEST(Aircraft, DriftsWithTheWind) {
 /// 1.2 s of tumbling with rotors running up and arms folding, in `steps` steps.
 AircraftState tumble(int steps) {
   const Vehicle vehicle = example_vehicle();
-  const Aircraft plant(vehicle, Truth(), bench_line().thrust_coefficient(), example_shadow());
+  const Aircraft plant(vehicle, Truth(), example_shadow());
   Angles nearly = vehicle.x;  // stays away from the body: the occlusion's onset is no smooth function
   for (Radians& arm : nearly) arm = from_degrees(120);
   ArmMotion motion(vehicle.x, kMorphSeconds);

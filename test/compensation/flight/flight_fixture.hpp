@@ -61,7 +61,12 @@ inline compensation::ThrustCurve scaled_loss(const compensation::ThrustCurve& cu
 }
 
 inline Scene example_scene(std::uint64_t seed = 1) {
-  return nominal_scene(example_vehicle(), example_settings(), bench_line(), seed);
+  Truth world = assumed_world(example_vehicle());
+  world.thrust_coefficient = bench_line().thrust_coefficient();
+  world.mass = 1.01;
+  world.thrust = {1.01, 0.99, 1.00, 1.01};
+  world.cog_error = {1e-3, -0.5e-3};
+  return nominal_scene(example_vehicle(), example_settings(), bench_line(), world, seed);
 }
 
 /// No noise, no error of mass, rotors, arms or centre of gravity, no drag: only the loss is not what the line says.

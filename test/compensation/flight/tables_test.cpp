@@ -14,54 +14,6 @@ namespace tables_test {
 using testing::HasSubstr;
 using testing::Not;
 
-NineFlights one_hover() {
-  NineFlights flights;
-  FlightResult& flight = flights[kHoverPlain];
-  flight.leg_count = 3;
-  flight.legs[1].mean_error = {0.0726, -0.0762, 0.1535};
-  flight.legs[1].mean_error_rate = {0, 0, 0.0036};
-  flight.legs[2].mean_error = {0, 0, -0.01};
-  return flights;
-}
-
-TEST(HoverTable, PutsOursBesideThePapers) {
-  const std::string table = hover_table(one_hover());
-  EXPECT_THAT(table, HasSubstr("X       O n.c.    0.0726  0.0762  0.1535  below     0.2200  0.1100  0.1700\n"));
-  EXPECT_THAT(table, HasSubstr("O n.c.  X         0.0000  0.0000  0.0100  above "));
-  EXPECT_THAT(table, Not(HasSubstr("X       O c."))) << "that flight was not flown";
-}
-
-TEST(HoverTable, SaysLostInsteadOfANumber) {
-  NineFlights flights = one_hover();
-  flights[kHoverPlain].lost = true;
-  flights[kHoverPlain].lost_leg = 1;
-  EXPECT_THAT(hover_table(flights), HasSubstr("X       O n.c.      lost "));
-  EXPECT_THAT(hover_table(flights), Not(HasSubstr("0.1535")));
-  EXPECT_THAT(height_table(flights, example_gains()), testing::IsEmpty());
-}
-
-TEST(HeightTable, ShowsTheIdentityForOursAndThePapers) {
-  const std::string table = height_table(one_hover(), example_gains());
-  EXPECT_THAT(table, HasSubstr("0.1535  0.0036"));
-  EXPECT_THAT(table, HasSubstr("  2.324 ")) << "15 * 0.1535 + 6 * 0.0036";
-  EXPECT_THAT(table, HasSubstr("-0.5005")) << "the paper's, from its own e and e'";
-}
-
-TEST(ForwardTable, ShowsMeanAndDeviationBesideThePapers) {
-  NineFlights flights;
-  flights[kRisingSwitched].leg_count = 2;
-  flights[kRisingSwitched].legs[0].mean_distance = 0.1939;
-  flights[kRisingSwitched].legs[0].deviation = 0.0177;
-  const std::string table = forward_table(flights);
-  EXPECT_THAT(table, HasSubstr("rising O n.c. - O c."));
-  EXPECT_THAT(table, HasSubstr("0.194 ±0.018  ( 0.213 ±0.045)"));
-  EXPECT_THAT(table, Not(HasSubstr("level")));
-}
-
-TEST(Tables, OfNothingFlownAreEmpty) {
-  EXPECT_EQ(hover_table({}) + height_table({}, example_gains()) + forward_table({}), "");
-}
-
 TEST(FindingsTable, TellsOverWhichDrawsItsPercentilesGoAndOnlyOfLawsThatWereDrawn) {
   Findings found;
   found.draws = 3;
@@ -110,7 +62,7 @@ TEST(TraceCsv, HasAFieldForEveryColumnAndARowForEveryTick) {
   ASSERT_EQ(lines.size(), example_trace().size() + 1);
   for (const std::string& line : lines) ASSERT_EQ(commas(line), commas(lines[0])) << line;
   EXPECT_THAT(lines[0], HasSubstr("time_s,leg,reference_x_m"));
-  EXPECT_THAT(lines[0], HasSubstr("speed4_rad_s"));
+  EXPECT_THAT(lines[0], HasSubstr("phi1_believed_rad,phi2_believed_rad"));
   EXPECT_THAT(lines[1], testing::StartsWith("0,1,0,0,1.5,"));
 }
 
@@ -121,6 +73,15 @@ TEST(DrawsCsv, HasAFieldForEveryColumnAndARowForEveryDraw) {
   for (const std::string& line : lines) EXPECT_EQ(commas(line), commas(lines[0])) << line;
   EXPECT_THAT(lines[1], testing::StartsWith("0,quadratic,1."));
   EXPECT_THAT(lines[2], testing::StartsWith("1,quadratic_by_load,1."));
+}
+
+TEST(ComparisonFigure, ShowsBothFlightsWithArmsOcclusionsAndSpeeds) {
+  const std::string script =
+      comparison_figure("Hover: X, O, X", kExperiments[kHoverPlain], example_trace(), example_trace());
+  EXPECT_THAT(script, HasSubstr("title 'Hover: X, O, X'"));
+  for (const char* axis : {"below reference [m]", "arm angle [deg]", "occlusion [deg]", "speed [RPM]"}) {
+    EXPECT_THAT(script, HasSubstr(std::string("set ylabel '") + axis + "'"));
+  }
 }
 
 TEST(ErrorFigure, NamesTheFlightAndItsLegs) {

@@ -1,0 +1,99 @@
+#include "compensation/flight/verdict.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+namespace kphi::flight {
+namespace {
+
+const Percentiles& merit(const Findings& findings, std::string_view key) {
+  const auto found = std::find_if(kMerits.begin(), kMerits.end(), [&](const Merit& one) { return one.key == key; });
+  return findings.merits[static_cast<std::size_t>(found - kMerits.begin())];
+}
+
+template <class... Values>
+std::string words(const char* format, Values... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+/// "in 12 of 400 draws", or of one set of circumstances.
+std::string in_draws(std::size_t count, const Findings& findings) {
+  if (findings.draws == 1) return "in the one set of circumstances flown";
+  return "in " + std::to_string(count) + " of " + std::to_string(findings.draws) + " draws";
+}
+
+void doubt_losses(Judgement& judgement, const Findings& found) {
+  if (static_cast<double>(found.lost_compensated) <= kLostShare * static_cast<double>(found.draws)) return;
+  judgement.fitness = Fitness::loses_the_vehicle;
+  judgement.doubts.push_back(
+      "would lose the vehicle " + in_draws(found.lost_compensated, found) +
+      ", with compensation or in X, where nothing is covered; check K_T and its unit, the mass, and "
+      "which arm's angle goes to which rotor");
+}
+
+void doubt_thrust(Judgement& judgement, const Findings& found) {
+  const double off = merit(found, "hover_z_x_m").p50;
+  if (found.kept == 0 || std::fabs(off) <= kHoverInX) return;
+  judgement.doubts.push_back(words(
+      "hovers %.2f m %s its reference in X, where nothing is covered: K_T of the file is too %s, or the mass of the "
+      "vehicle file too %s; weigh the vehicle, and measure K_T again",
+      std::fabs(off), off > 0 ? "below" : "above", off > 0 ? "large" : "small", off > 0 ? "small" : "large"));
+}
+
+void doubt_help(Judgement& judgement, const Findings& found) {
+  if (2 * found.kept < found.draws || found.kept == 0) return;  // the few that were not lost say little of it
+  const double plain = merit(found, "hover_z_plain_m").p50 - merit(found, "hover_z_x_m").p50;
+  const double left = merit(found, "hover_z_compensated_m").p50 - merit(found, "hover_z_x_m").p50;
+  if (left < -kOverCompensated * plain) {
+    judgement.doubts.push_back(
+        words("over-compensates: in O it hovers %.2f m above where it hovers in X, without compensation %.2f m below; "
+              "k(φ) falls "
+              "too steeply, check the slope and how φ is measured",
+              -left, plain));
+  } else if (found.hover_z_better < kBetterShare || left > 0.7 * plain) {
+    judgement.doubts.push_back(
+        words("does not help: in O it hovers %.2f m below where it hovers in X, without compensation %.2f m; nearer in "
+              "%.0f %% of "
+              "the draws; k(φ) falls too little, check the slope",
+              left, plain, 100 * found.hover_z_better));
+  }
+  const double sideways = merit(found, "hover_xy_ratio").p50;
+  if (sideways > kSidewaysRatio) {
+    judgement.doubts.push_back(
+        words("pushes the vehicle sideways: in O it hovers %.1f times as far from its place as without compensation; "
+              "check which "
+              "arm's angle goes to which rotor",
+              sideways));
+  }
+}
+
+}  // namespace
+
+Judgement judgement_of(const Findings& findings) {
+  Judgement judgement;
+  doubt_losses(judgement, findings);
+  doubt_thrust(judgement, findings);
+  doubt_help(judgement, findings);
+  if (!judgement.doubts.empty() && judgement.fitness == Fitness::fit_to_fly) judgement.fitness = Fitness::not_better;
+  return judgement;
+}
+
+std::string words_of(const Judgement& judgement, const Findings& findings) {
+  if (judgement.fitness == Fitness::fit_to_fly) {
+    if (findings.draws == 1) {
+      return "verdict: fit to fly in this world, in the one set of circumstances flown; --draws 300 flies more of "
+             "them\n\n";
+    }
+    return "verdict: fit to fly in this world; the vehicle is lost " + in_draws(findings.lost_compensated, findings) +
+           " with compensation or in X, " + in_draws(findings.lost_plain, findings) + " in O without\n\n";
+  }
+  std::string text = "verdict: NOT fit to fly in this world\n";
+  for (const std::string& doubt : judgement.doubts) text += "- " + doubt + "\n";
+  return text + "\n";
+}
+
+}  // namespace kphi::flight

@@ -1,0 +1,21 @@
+// What a world file says: the air and the vehicle as they are in a simulated flight, which the controller never reads.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "compensation/flight/aircraft.hpp"
+
+namespace kphi::profiles {
+
+struct World {
+  std::string name;
+  flight::Truth truth;  ///< its drag counts only if `drag`
+  bool drag = false;    ///< given; else that of the vehicle file
+  std::string path;
+};
+
+[[nodiscard]] World load_world(const std::string& path);
+[[nodiscard]] World parse_world(const std::string& text, const std::string& path);
+
+}  // namespace kphi::profiles
