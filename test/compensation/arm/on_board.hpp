@@ -1,0 +1,95 @@
+// The library built for a microcontroller as firmware would build it, run under qemu, counted and weighed.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "test/end_to_end/process.hpp"
+#include "test/source_dir.hpp"
+#include "test/temporary_folder.hpp"
+
+namespace kphi::test {
+
+struct Processor {
+  const char* name;   ///< as gcc calls it
+  const char* board;  ///< as qemu calls it
+};
+inline constexpr Processor kM4f{"cortex-m4", "mps2-an386"}, kM7{"cortex-m7", "mps2-an500"};
+
+/// What is missing to build and run; empty: nothing.
+inline std::string missing_for_boards() {
+  const char* path = std::getenv("PATH");
+  for (const char* program : {"arm-none-eabi-g++", "qemu-system-arm"}) {
+    std::istringstream folders(path != nullptr ? path : "");
+    bool found = false;
+    for (std::string folder; std::getline(folders, folder, ':');)
+      found = found || std::filesystem::exists(std::filesystem::path(folder) / program);
+    if (!found) return std::string("needs ") + program + ": `./run peers` installs it";
+  }
+  return "";
+}
+
+class OnBoard {
+ public:
+  /// `type`: of CMake's builds, such as Release. Throws what the build says if it fails.
+  OnBoard(const Processor& processor, const std::string& type, bool in_float = true) : processor_(processor) {
+    const std::string source = source_dir();
+    (void)output_of({"cmake", "-S", source + "/test/compensation/arm", "-B", built(), "-G", "Ninja",
+                     "-DCMAKE_TOOLCHAIN_FILE=" + source + "/test/compensation/arm/toolchain.cmake",
+                     std::string("-DCPU=") + processor.name, "-DCMAKE_BUILD_TYPE=" + type,
+                     "-DLIBRARY=" + source + "/compensation",
+                     std::string("-DKPHI_COMPENSATION_FLOAT=") + (in_float ? "ON" : "OFF")});
+    (void)output_of({"cmake", "--build", built(), "--parallel", "1"});
+  }
+
+  /// Instructions of each call that counts.cpp counts.
+  [[nodiscard]] std::map<std::string, int> counts() const {
+    std::istringstream lines(output_of({"qemu-system-arm", "-M", processor_.board, "-nographic", "-semihosting",
+                                        "-icount", "shift=0", "-kernel", built() + "/counts"}));
+    std::map<std::string, int> counts;
+    std::string name;
+    for (int count = 0; lines >> name >> count;) counts[name] = count;
+    return counts;
+  }
+  /// What those calls link of the library: its code without the mathematics of the compiler's.
+  [[nodiscard]] long code_bytes() const {
+    std::istringstream symbols(output_of({"arm-none-eabi-nm", "-S", built() + "/counts"}));
+    std::map<std::string, long> sizes;  // by address: constructors have two names
+    for (std::string line; std::getline(symbols, line);) {
+      std::istringstream fields(line);
+      std::string address, size, kind, symbol;
+      if (!(fields >> address >> size >> kind >> symbol) || symbol.find("kphi12compensation") == std::string::npos)
+        continue;
+      if (std::string("tTwW").find(kind) != std::string::npos) sizes[address] = std::stol(size, nullptr, 16);
+    }
+    long code = 0;
+    for (const auto& [address, size] : sizes) code += size;
+    return code;
+  }
+  /// All names in the archive.
+  [[nodiscard]] std::string names() const {
+    return output_of({"arm-none-eabi-nm", built() + "/library/libkphi_compensation.a"});
+  }
+
+ private:
+  [[nodiscard]] std::string built() const { return (folder_ / "build").string(); }
+  /// Of both streams: qemu hands on what a program says on stderr.
+  static std::string output_of(const std::vector<std::string>& command) {
+    Process process(command);
+    const int code = process.wait();
+    if (code != 0)
+      throw std::runtime_error(command[0] + " ended with " + std::to_string(code) + ":\n" + process.out() +
+                               process.err());
+    return process.out() + process.err();
+  }
+
+  Processor processor_;
+  TemporaryFolder folder_;
+};
+
+}  // namespace kphi::test
