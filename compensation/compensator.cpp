@@ -158,13 +158,28 @@ void Compensator::enable(bool on) noexcept {
   for (std::size_t i = 0; i < rotors(); ++i) apply_occlusion(i);
 }
 
+bool Compensator::set_air_density_ratio(Real ratio) noexcept {
+  if (!(ratio > Real(0.1) && ratio < 10)) return false;
+  density_ratio_ = ratio;
+  for (std::size_t i = 0; i < rotors(); ++i) apply_occlusion(i);
+  return true;
+}
+
+void Compensator::resume_from(const Compensator& before) noexcept {
+  enabled_ = before.enabled_;
+  density_ratio_ = before.density_ratio_;
+  set_arms(before.arm_angles_);
+  for (std::size_t i = 0; i < rotors(); ++i) apply_occlusion(i);
+}
+
 void Compensator::apply_occlusion(std::size_t rotor) noexcept {
   const ThrustCurve& curve = curves_[rotor];
   const Radians phi = occlusion_angles_[rotor];
   const bool covered = enabled_ && phi.value() > 0;
   const Real scaling = covered ? curve.scaling_factor(phi, law_) : Real(1);
   // The published law reaches 0 and below: divide by next to nothing then, and the fastest speed holds.
-  const Real effective = std::max(curve.thrust_coefficient().value() * scaling, std::numeric_limits<Real>::min());
+  const Real effective =
+      std::max(curve.thrust_coefficient().value() * scaling * density_ratio_, std::numeric_limits<Real>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
   thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_));
@@ -208,7 +223,7 @@ Rotors<Newtons> Compensator::uncovered_thrusts(const Rotors<Newtons>& thrusts) c
   Rotors<Newtons> uncovered(rotors());
   for (std::size_t i = 0; i < rotors(); ++i) {
     const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);
-    const Real coefficient = curves_[i].thrust_coefficient().value();
+    const Real coefficient = curves_[i].thrust_coefficient().value() * density_ratio_;
     uncovered[i] =
         Newtons(std::min(possible * (coefficient / effective_coefficients_[i]), coefficient * (fastest_ * fastest_)));
   }

@@ -99,13 +99,24 @@ class Compensator {
   /// Whether it compensates; it does from the beginning.
   [[nodiscard]] bool enabled() const noexcept { return enabled_; }
 
+  /// The air's density now over that of the fit (`air_density_kg_m3` of its file): thrust and torque per ω² go with it.
+  /// 1 from the beginning; at 1000 m in standard air 0.91. False, and the ratio before is kept, unless it is in (0.1,
+  /// 10).
+  bool set_air_density_ratio(Real ratio) noexcept;
+  [[nodiscard]] Real air_density_ratio() const noexcept { return density_ratio_; }
+
+  /// New coefficients in flight: this one, just built, goes on from where `before` is: its arms, whether it
+  /// compensates, its air. Then copy it over `before` between two control steps. Arms that `before` does not know stay
+  /// uncovered.
+  void resume_from(const Compensator& before) noexcept;
+
   /// 3 to 8.
   [[nodiscard]] std::size_t rotors() const noexcept { return curves_.size(); }
   /// φ of each rotor [rad], in [0, 2π].
   [[nodiscard]] const Rotors<Radians>& occlusion_angles() const noexcept { return occlusion_angles_; }
   /// k_i.
   [[nodiscard]] const Rotors<Real>& scaling_factors() const noexcept { return scaling_factors_; }
-  /// K_T k_i ω_fastest²: what each rotor can give now, for the saturation before this map.
+  /// K_T k_i ω_fastest², in the air of now: what each rotor can give, for the saturation before this map.
   [[nodiscard]] const Rotors<Newtons>& thrust_max() const noexcept { return thrust_max_; }
   /// 1/k_i: torque follows ω², so torque per thrust grows by this; for the allocation. At most 1/kScalingFloor.
   [[nodiscard]] const Rotors<Real>& drag_scale() const noexcept { return drag_scale_; }
@@ -125,7 +136,8 @@ class Compensator {
   /// Adds what was done to these thrusts and to the speeds that they want.
   void flag(const Rotors<Newtons>& thrusts, const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
 
-  Rotors<Real> effective_coefficients_;  // K_T k_i, positive: what speeds_for divides by
+  Rotors<Real> effective_coefficients_;  // K_T k_i with the air's density, positive: what speeds_for divides by
+  Real density_ratio_ = 1;
   Real slowest_;
   Real fastest_;
   Rotors<Flags> arm_flags_;

@@ -190,6 +190,14 @@ kphi_real kphi_throttle(kphi_real full_n, kphi_real square_share, kphi_real unco
 
 void kphi_enable(kphi_compensator* compensator, int on) { of(compensator).enable(on != 0); }
 
+int kphi_set_air_density_ratio(kphi_compensator* compensator, kphi_real ratio) {
+  return of(compensator).set_air_density_ratio(ratio) ? 1 : 0;
+}
+
+void kphi_resume_from(kphi_compensator* compensator, const kphi_compensator* before) {
+  of(compensator).resume_from(of(before));
+}
+
 void kphi_occlusion_angles(const kphi_compensator* compensator, kphi_real* angles_rad) {
   hand_out(of(compensator).occlusion_angles(), angles_rad);
 }

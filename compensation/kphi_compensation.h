@@ -130,6 +130,11 @@ kphi_real kphi_throttle(kphi_real full_n, kphi_real square_share, kphi_real unco
 // Compensated or not; off is the plain map sqrt(T/K_T) bit for bit.
 void kphi_enable(kphi_compensator* compensator, int on);
 
+// The air's density now over that of the fit; 0, and the ratio before is kept, unless it is in (0.1, 10).
+int kphi_set_air_density_ratio(kphi_compensator* compensator, kphi_real ratio);
+// New coefficients in flight: `compensator`, just built, goes on from where `before` is; then copy it over `before`.
+void kphi_resume_from(kphi_compensator* compensator, const kphi_compensator* before);
+
 // phi of each rotor [rad, 0 .. 2 pi], and k_i: [0.1, 1], or what equation 4 gives.
 void kphi_occlusion_angles(const kphi_compensator* compensator, kphi_real* angles_rad);
 void kphi_scaling_factors(const kphi_compensator* compensator, kphi_real* factors);

@@ -203,6 +203,52 @@ TEST(Compensator, TakesThreeToEightRotorsWithPropellersOfTheirOwn) {
   EXPECT_EQ(build_with(paper_line(), airframe).refusal, Refusal::arm_limits);
 }
 
+TEST(Compensator, TurnsFasterInThinAirByTheRootOfItsDensity) {
+  Compensator compensator = with_arms(shape_o());
+  const auto thrusts = thrusts_of(1, 1.5, 2, 1);
+  const auto before = compensator.speeds_for(thrusts).speeds;
+  const auto most = compensator.thrust_max();
+  ASSERT_TRUE(compensator.set_air_density_ratio(0.9075));  // standard air at 1000 m
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(compensator.speeds_for(thrusts).speeds[i] / before[i], std::sqrt(1 / 0.9075), 1e-12);
+    EXPECT_NEAR(compensator.thrust_max()[i] / most[i], 0.9075, 1e-12);
+    EXPECT_NEAR(compensator.uncovered_thrusts(thrusts)[i].value(),
+                thrusts[i].value() / compensator.scaling_factors()[i], 1e-12)
+        << "the stack's own curve knows its air";
+  }
+  compensator.set_arms(shape_x());
+  EXPECT_NEAR(compensator.speeds_for(thrusts).speeds[1].value(),
+              std::sqrt(1.5 / (kExampleCoefficient.value() * 0.9075)), 1e-9)
+      << "after a move, too";
+  for (const double bad : {0.0, -1.0, 0.1, 10.0, kNaN, kInfinity}) EXPECT_FALSE(compensator.set_air_density_ratio(bad));
+  EXPECT_EQ(compensator.air_density_ratio(), 0.9075);
+}
+
+TEST(Compensator, GetsNewCoefficientsInFlightWithoutForgettingItsArms) {
+  Compensator flies = with_arms(shape_o());
+  flies.set_air_density_ratio(0.95);
+  const auto thrusts = thrusts_of(1, 1.5, 2, 1);
+
+  Compensator same = example_compensator();
+  same.resume_from(flies);
+  EXPECT_EQ(same.speeds_for(thrusts).speeds, flies.speeds_for(thrusts).speeds) << "no step where nothing changed";
+
+  Compensator better = build_with(example_line(1.02, -0.0026), example_airframe()).compensator.value();
+  better.resume_from(flies);
+  EXPECT_EQ(better.occlusion_angles(), flies.occlusion_angles());
+  flies = better;
+  Compensator expected = build_with(example_line(1.02, -0.0026), example_airframe()).compensator.value();
+  expected.set_air_density_ratio(0.95);
+  expected.set_arms(shape_o());
+  EXPECT_EQ(flies.speeds_for(thrusts).speeds, expected.speeds_for(thrusts).speeds);
+
+  flies.enable(false);
+  better.resume_from(flies);
+  EXPECT_FALSE(better.enabled());
+  better.resume_from(example_compensator());
+  EXPECT_TRUE(better.arm_flags()[0].has(Flag::arm_angle_unknown)) << "nobody knows its arms yet";
+}
+
 TEST(Compensator, PromisesNotToThrow) {
   using C = Compensator;
   static_assert(noexcept(std::declval<C&>().set_arms(std::array<Radians, 4>{})));
