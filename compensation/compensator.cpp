@@ -192,28 +192,37 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
 }
 
 SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexcept {
+  SpeedCommand command{Rotors<RadPerSec>(rotors()), arm_flags_};
   // In passes over all rotors: the compiler makes vector instructions of them. Flags are for what was changed alone.
-  Real wanted[kMostRotors], changed = 0;
-  const std::size_t count = rotors();
-  SpeedCommand command{Rotors<RadPerSec>(count), arm_flags_};
-  for (std::size_t i = 0; i < count; ++i) {
-    const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);  // NaN compares false
-    wanted[i] = std::sqrt(possible / effective_coefficients_[i]);
-    const Real raised = wanted[i] < slowest_ ? slowest_ : wanted[i], held = raised > fastest_ ? fastest_ : raised;
-    changed += std::fabs(held - wanted[i]) + std::fabs(possible - asked);
-    command.speeds[i] = RadPerSec(held);
-  }
-  if (!(changed <= 0)) flag(thrusts, wanted, command.flags);
+  const auto in_passes = [&](auto count) {
+    Real asked[kMostRotors], possible[kMostRotors], wanted[kMostRotors], held[kMostRotors], changed = 0;
+    for (std::size_t i = 0; i < count; ++i) asked[i] = thrusts[i].value();
+    for (std::size_t i = thrusts.size(); i < count; ++i) asked[i] = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      possible[i] = asked[i] > 0 ? asked[i] : Real(0);  // NaN compares false
+      wanted[i] = std::sqrt(possible[i] / effective_coefficients_[i]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Real raised = wanted[i] < slowest_ ? slowest_ : wanted[i];
+      held[i] = raised > fastest_ ? fastest_ : raised;
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      changed += std::fabs(held[i] - wanted[i]) + std::fabs(possible[i] - asked[i]);
+    for (std::size_t i = 0; i < count; ++i) command.speeds[i] = RadPerSec(held[i]);
+    if (!(changed <= 0)) flag(asked, wanted, command.flags);
+  };
+  // A microcontroller has no vectors, and little room for code.
+  constexpr bool kVectors = sizeof(Real) == sizeof(double);
+  kVectors&& rotors() == 4 ? in_passes(std::integral_constant<std::size_t, 4>()) : in_passes(rotors());
   return command;
 }
 
-void Compensator::flag(const Rotors<Newtons>& thrusts, const Real (&wanted)[kMostRotors],
+void Compensator::flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors],
                        Rotors<Flags>& flags) const noexcept {
   for (std::size_t i = 0; i < rotors(); ++i) {
-    const Real asked = thrust_of(thrusts, i);
     flags[i] = flags[i]
-                   .with(Flag::thrust_nan, std::isnan(asked))
-                   .with(Flag::thrust_negative, asked < 0)
+                   .with(Flag::thrust_nan, std::isnan(asked[i]))
+                   .with(Flag::thrust_negative, asked[i] < 0)
                    .with(Flag::speed_at_slowest, wanted[i] < slowest_ * (1 - kRounding))
                    .with(Flag::speed_at_fastest, wanted[i] > fastest_ * (1 + kRounding));
   }

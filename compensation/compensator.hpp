@@ -134,7 +134,7 @@ class Compensator {
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
   /// Adds what was done to these thrusts and to the speeds that they want.
-  void flag(const Rotors<Newtons>& thrusts, const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
+  void flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
 
   Rotors<Real> effective_coefficients_;  // K_T k_i with the air's density, positive: what speeds_for divides by
   Real density_ratio_ = 1;

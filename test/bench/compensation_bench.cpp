@@ -57,7 +57,7 @@ void compare(const char* what, Work work, Peer peer, double goal) {
 }
 
 /// Not inlined: the peers are calls across a library boundary, as the library's own are.
-[[gnu::noinline]] std::array<RadPerSec, 4> plain_speeds(const std::array<Newtons, 4>& thrusts, ThrustCoefficient k) {
+[[gnu::noinline]] std::array<RadPerSec, 4> plain_speeds(const Rotors<Newtons>& thrusts, ThrustCoefficient k) {
   std::array<RadPerSec, 4> speeds;
   for (std::size_t i = 0; i < 4; ++i) speeds[i] = RadPerSec(std::sqrt(thrusts[i].value() / k.value()));
   return speeds;
@@ -119,9 +119,7 @@ void compare_set_arms(const char* what, const std::array<Radians, 4>& arms, doub
 }
 
 void compare_mixing() {
-  RotorLayout layout;
-  for (std::size_t i = 0; i < 4; ++i) layout.hubs[i] = hub_in_body(example_airframe(), i, shape_o()[i]);
-  const Mixer mixer = *Mixer::build(layout, {Metres(0.0133), 0.0});
+  const Mixer mixer = *Mixer::build(example_layout(shape_o()), {Metres(0.0133), 0.0});
   const ThrustLimits limits{{}, thrusts_of(5.2, 5.2, 5.6, 5.2)};
   const auto mix = [&](const Wrench& demand) {
     return [&mixer, &limits, demand](int) {
@@ -138,7 +136,7 @@ void compare_mixing() {
 }  // namespace
 
 int main() {
-  auto thrusts = thrusts_of(1.4, 1.5, 1.6, 1.7);
+  Rotors<Newtons> thrusts = thrusts_of(1.4, 1.5, 1.6, 1.7);  // as the mixer gives them
   Compensator compensator = example_compensator();
   compensator.set_arms(shape_o());
   compare(

@@ -114,9 +114,7 @@ void set_arms(double clock) {
 }
 
 void mixing(double clock) {
-  RotorLayout layout;
-  for (std::size_t i = 0; i < 4; ++i) layout.hubs[i] = hub_in_body(example_airframe(), i, shape_o()[i]);
-  const Mixer mixer = *Mixer::build(layout, {Metres(0.0133), 0.0});
+  const Mixer mixer = *Mixer::build(example_layout(shape_o()), {Metres(0.0133), 0.0});
   const ThrustLimits limits{{}, thrusts_of(5.2, 5.2, 5.6, 5.2)};
   const auto demands = drawn<Newtons>(kInputs, -1, 1);
   const Latencies found = latencies(kInputs, kRounds, clock, [&](std::size_t input) {

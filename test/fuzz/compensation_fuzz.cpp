@@ -74,7 +74,7 @@ Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
     corners[i] = {Metres(0.1 * std::cos(direction)), Metres(0.1 * std::sin(direction))};
   }
   if (const auto outline = ConvexPolygon::from(corners, count)) {
-    frame.polygon = PolygonBody{*outline, Rotors<Hinge>(4)};
+    frame.polygon = PolygonBody{*outline, Rotors<Hinge>(bytes.byte() % 9)};
     for (Hinge& hinge : frame.polygon->hinges) {
       hinge = {{Metres(bytes.number(0.2)), Metres(bytes.number(0.2))}, Radians(bytes.number(7)), kind % 3 == 0};
     }
@@ -83,15 +83,15 @@ Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
 }
 
 void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes& bytes) {
-  std::array<Radians, 4> arms;
-  std::array<Newtons, 4> thrusts;
+  Rotors<Radians> arms(compensator.rotors());
+  Rotors<Newtons> thrusts(compensator.rotors());
   for (Radians& arm : arms) arm = Radians(bytes.number(4));
   for (Newtons& thrust : thrusts) thrust = Newtons(bytes.number(8));
   compensator.enable(bytes.byte() % 4 != 0);
   compensator.set_arms(arms);
   const SpeedCommand command = compensator.speeds_for(thrusts);
   const auto uncertainties = compensator.speed_uncertainties(thrusts, Radians(bytes.number(0.1)));
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < compensator.rotors(); ++i) {
     const double phi = compensator.occlusion_angles()[i].value(), k = compensator.scaling_factors()[i];
     require(phi >= 0.0 && phi <= 2 * kPi);
     require(k <= 1.0 && (law == ScalingLaw::published || k >= kScalingFloor));
@@ -104,12 +104,14 @@ void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes&
 }
 
 void mix(const Compensator* compensator, Bytes& bytes) {
-  RotorLayout layout;
+  const std::size_t count = compensator != nullptr ? compensator->rotors() : 3 + bytes.byte() % 6;
+  RotorLayout layout{Rotors<HubPosition>(count), Rotors<int>(count)};
+  for (std::size_t i = 0; i < count; ++i) layout.spins[i] = i % 2 == 0 ? 1 : -1;
   for (HubPosition& hub : layout.hubs) hub = {Metres(bytes.number(0.2)), Metres(bytes.number(0.2))};
   auto mixer = Mixer::build(layout, {Metres(bytes.number(0.02)), bytes.number(0.001)});
   if (!mixer) return;
-  ThrustLimits limits;
-  for (std::size_t i = 0; i < 4; ++i) {
+  ThrustLimits limits{Rotors<Newtons>(count), Rotors<Newtons>(count)};
+  for (std::size_t i = 0; i < count; ++i) {
     limits.smallest[i] = Newtons(bytes.number(1));
     limits.largest[i] = Newtons(bytes.number(8));
   }
@@ -146,15 +148,17 @@ void fly_in_c(Bytes& bytes) {
   for (auto& corner : airframe.corners) corner[0] = bytes.number(0.2), corner[1] = bytes.number(0.2);
   for (int i = 0; i < 4; ++i) airframe.hinge_turns[i] = i;
   if (bytes.byte() % 4 == 0) airframe.hinge_turns[bytes.byte() % 4] = static_cast<signed char>(bytes.byte());
-  const kphi_line lines[4] = {line, line, line, line};
+  airframe.rotors = bytes.byte() % 2 == 0 ? 0 : static_cast<signed char>(bytes.byte());
+  kphi_line lines[KPHI_MAX_ROTORS];
+  for (kphi_line& one : lines) one = line;
   kphi_compensator compensator;
   const int refusal =
       kphi_compensator_build(&compensator, lines, &airframe, static_cast<signed char>(bytes.byte()) % 3);
   require(std::strlen(kphi_refusal_text(refusal)) > 0);
   if (refusal != 0) return;
-  double arms[4], thrusts[4], speeds[4], uncertainties[4];
-  unsigned char flags[4];
-  for (int i = 0; i < 4; ++i) arms[i] = bytes.number(4), thrusts[i] = bytes.number(8);
+  double arms[KPHI_MAX_ROTORS], thrusts[KPHI_MAX_ROTORS], speeds[KPHI_MAX_ROTORS] = {}, uncertainties[KPHI_MAX_ROTORS];
+  unsigned short flags[KPHI_MAX_ROTORS];
+  for (int i = 0; i < KPHI_MAX_ROTORS; ++i) arms[i] = bytes.number(4), thrusts[i] = bytes.number(8);
   kphi_set_arms(&compensator, arms);
   kphi_speeds_for(&compensator, thrusts, speeds, bytes.byte() % 2 == 0 ? flags : nullptr);
   kphi_speed_uncertainties(&compensator, thrusts, bytes.number(0.1), uncertainties);
@@ -170,7 +174,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto some = line(bytes, overlap), other = line(bytes, overlap);
   const Airframe frame = airframe(bytes, overlap);
   std::optional<Compensator> compensator;
-  if (some && other) compensator = Compensator::build({*some, *other, *some, *other}, frame, law).compensator;
+  if (some && other) {
+    Rotors<ThrustCurve> curves(rotors_of(frame), *some);
+    for (std::size_t i = 1; i < curves.size(); i += 2) curves[i] = *other;
+    compensator = Compensator::build(curves, frame, law).compensator;
+  }
   for (int i = 0; i < 50 && bytes.more(); ++i) {
     if (compensator) fly(*compensator, frame, law, bytes);
     mix(compensator ? &*compensator : nullptr, bytes);
