@@ -6,8 +6,10 @@
 namespace kphi::compensation {
 namespace {
 
-constexpr Real kLargestDemand = Real(1e9);     // N, N m: beyond it the arithmetic could overflow
-constexpr Real kLargestDragScale = Real(1e6);  // and a layout could, too
+constexpr Real kLargestDemand = Real(1e9);  // N, N m: beyond it the arithmetic could overflow
+// A layout and its torques could overflow or vanish, too.
+constexpr Real kLargestDragScale = Real(1e6), kSmallestDragScale = Real(1e-6);
+constexpr Real kSmallestTorque = Real(1e-9);  // N m per N
 constexpr bool kDouble = sizeof(Real) == sizeof(double);
 constexpr int kTorqueIterations = 10;
 constexpr int kSearches = 4;
@@ -33,7 +35,7 @@ bool usable(const RotorLayout& layout, const Row& drag_scale) noexcept {
     const Real x = layout.hubs[i].x.value(), y = layout.hubs[i].y.value();
     if (!(std::fabs(x) < Real(1e6)) || !(std::fabs(y) < Real(1e6))) return false;
     if (layout.spins[i] != 1 && layout.spins[i] != -1) return false;
-    if (!(drag_scale[i] > 0) || !(drag_scale[i] < kLargestDragScale)) return false;
+    if (!(drag_scale[i] > kSmallestDragScale) || !(drag_scale[i] < kLargestDragScale)) return false;
   }
   return true;
 }
@@ -84,7 +86,8 @@ Row negative(Row row) noexcept {
 
 std::optional<Mixer> Mixer::build(const RotorLayout& layout, DragTorque drag) noexcept {
   const Real per_newton = drag.per_newton.value();
-  if (!(per_newton > 0) || !(per_newton < Real(1e6)) || !(std::fabs(drag.per_square_newton) < Real(1e6))) {
+  if (!(per_newton > kSmallestTorque) || !(per_newton < Real(1e6)) ||
+      !(std::fabs(drag.per_square_newton) < Real(1e6))) {
     return std::nullopt;
   }
   Mixer mixer(drag);

@@ -27,7 +27,7 @@ namespace kphi::compensation {
 /// Torque per thrust, κ(f) = drag_scale (per_newton + per_square_newton drag_scale f), the bracket held within half and
 /// twice per_newton.
 struct DragTorque {
-  Metres per_newton{0};        ///< N m per N, positive, e.g. 0.0133
+  Metres per_newton{0};        ///< N m per N, above 1e-9, e.g. 0.0133
   Real per_square_newton = 0;  ///< N m per N²; how κ changes with the load; 0: κ is constant
 };
 
@@ -65,11 +65,11 @@ struct MixedThrusts {
 
 class Mixer {
  public:
-  /// Nothing if the layout cannot be flown (see set_layout), or `drag` is not finite or its per_newton not positive.
+  /// Nothing if the layout cannot be flown (see set_layout), or `drag` is not finite or its per_newton not above 1e-9.
   [[nodiscard]] static std::optional<Mixer> build(const RotorLayout& layout, DragTorque drag) noexcept;
 
   /// At servo rate: new positions (relative to the centre of gravity of the new shape) and Compensator::drag_scale(),
-  /// each positive; none: 1 for every rotor. False, and the layout before is kept, if it has not 3 to 8 hubs and as
+  /// each above 1e-6; none: 1 for every rotor. False, and the layout before is kept, if it has not 3 to 8 hubs and as
   /// many spins, a number is not finite, a spin is neither +1 nor −1, a drag scale is not positive, or the rotors
   /// cannot make every torque (hubs on one line, or a yaw that no difference of thrusts gives). Three rotors never make
   /// a yaw of their own: there it comes as it comes, and a tail servo must answer for it.
