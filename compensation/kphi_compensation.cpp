@@ -143,8 +143,8 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line* lines, const 
 
 const char* kphi_refusal_text(int refusal) {
   static constexpr const char* kMore[] = {
-      "a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap measure, and "
-      "variances that are not negative",
+      ("a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap measure, "
+       "and variances that are not negative"),
       "the body must have 3 to 12 corners, finite, counter-clockwise and convex",
       "the law is neither KPHI_LAW_CLAMPED nor KPHI_LAW_PUBLISHED",
       "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE"};
