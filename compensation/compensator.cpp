@@ -127,15 +127,15 @@ Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
   return occlusion_angles_[i].value() > 0 ? Arm::left_body : Arm::at_rest;
 }
 
-void Compensator::set_arms(const Rotors<Radians>& arm_angles, const ArmMotion& motion) noexcept {
+void Compensator::set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback& feedback) noexcept {
   // In passes over all arms: the long calls of one pass do not wait for each other.
   Arm arms[kMostRotors];
   bool all_at_rest = true;
-  const Real age = motion.age.value();
+  const Real age = feedback.age.value();
   for (std::size_t i = 0; i < rotors(); ++i) {
     arms[i] = take(i, i < arm_angles.size() ? arm_angles[i] : Radians(kUnknownAngle));
     all_at_rest = all_at_rest && arms[i] == Arm::at_rest;
-    const Real rate = i < motion.rates.size() ? motion.rates[i].value() : Real(0);
+    const Real rate = i < feedback.rates.size() ? feedback.rates[i].value() : Real(0);
     const bool fresh = std::fabs(rate) * age <= airframe_.arms.stale.value();
     arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_stale, !fresh);
   }

@@ -45,7 +45,7 @@ struct SpeedCommand {
 };
 
 /// How the arms moved when their angles were measured, and how long ago that was.
-struct ArmMotion {
+struct ArmFeedback {
   Seconds age{0};             ///< not negative; NaN counts as for ever
   Rotors<RadPerSec> rates{};  ///< of each arm; missing ones count as 0
 };
@@ -75,9 +75,9 @@ class Compensator {
                                           ScalingLaw law = ScalingLaw::clamped) noexcept;
 
   /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite, or outside the arm's
-  /// limits, keeps the last φ. With `motion` an arm that may have gone on moving by more than ArmLimits::stale is
+  /// limits, keeps the last φ. With `feedback` an arm that may have gone on moving by more than ArmLimits::stale is
   /// flagged. Before the first call no propeller is taken to be covered.
-  void set_arms(const Rotors<Radians>& arm_angles, const ArmMotion& motion = {}) noexcept;
+  void set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback& feedback = {}) noexcept;
 
   /// At control rate. ω = sqrt(max(T, 0) / (K_T k_i)) (equation 4), held between slowest and fastest; never NaN.
   /// Where nothing is covered this is sqrt(T / K_T) bit for bit. Missing thrusts count as 0.

@@ -40,7 +40,7 @@ class CompensatorNode : public rclcpp::Node {
   void on_arms(const sensor_msgs::msg::JointState& arms) {
     flying::Rotors<kphi::Radians> angles(arms.position.size());
     for (std::size_t i = 0; i < angles.size(); ++i) angles[i] = kphi::Radians(arms.position[i]);
-    flying::ArmMotion motion;
+    flying::ArmFeedback motion;
     motion.age = kphi::Seconds((now() - arms.header.stamp).seconds());
     motion.rates = flying::Rotors<kphi::RadPerSec>(arms.velocity.size());
     for (std::size_t i = 0; i < motion.rates.size(); ++i) motion.rates[i] = kphi::RadPerSec(arms.velocity[i]);
