@@ -38,6 +38,8 @@ struct Flown {
   NineFlights on_bench;  ///< as much lost as on the bench: γ = 1
   std::vector<Draw> draws;
   std::vector<CogSign> signs;
+  Findings findings;    ///< of the draws, or of the one set of circumstances
+  Judgement judgement;  ///< by them; only if all nine were flown
 };
 
 void require_section(const profiles::Vehicle& file, bool is_given, const char* section) {
@@ -133,8 +135,12 @@ void write_out(const FlyRequest& request, const Flown& flown, const std::array<s
   if (!skipped.empty()) fmt::print(stderr, "no figures: {}\n", skipped);
 }
 
+bool all_flown(const Flown& flown) {
+  return std::ranges::all_of(flown.flights, [](const FlightResult& flight) { return flight.leg_count > 0; });
+}
+
 Flown fly_requested(const FlyRequest& request) {
-  Flown flown{nominal_of(request), {}, {}, {}, {}};
+  Flown flown{nominal_of(request), {}, {}, {}, {}, {}, {}};
   Scene on_bench = flown.nominal;
   on_bench.truth.gamma = 1;
   const Shadow shadow(flown.nominal.vehicle.airframe);
@@ -148,6 +154,8 @@ Flown fly_requested(const FlyRequest& request) {
   const std::size_t threads = request.threads > 0 ? request.threads : std::max(1u, std::thread::hardware_concurrency());
   flown.draws = fly_draws(flown.nominal, shadow, request.draws, threads);
   if (request.experiment.empty()) flown.signs = signs_of_cog(flown.nominal, shadow);
+  flown.findings = findings_of(flown.draws.empty() ? std::vector<Draw>{{flown.nominal, flown.flights}} : flown.draws);
+  flown.judgement = judgement_of(flown.findings);
   if (!request.out.empty()) write_out(request, flown, traces);
   return flown;
 }
@@ -175,15 +183,6 @@ std::string circumstances(const FlyRequest& request, const Scene& scene) {
       name_of(truth.law), truth.gamma, off, request.seed);
 }
 
-/// What was flown, for the verdict: the draws, or the one set of circumstances.
-Findings judged(const Flown& flown) {
-  return findings_of(flown.draws.empty() ? std::vector<Draw>{{flown.nominal, flown.flights}} : flown.draws);
-}
-
-bool all_flown(const Flown& flown) {
-  return std::ranges::all_of(flown.flights, [](const FlightResult& flight) { return flight.leg_count > 0; });
-}
-
 std::vector<PaperCell> cells_of(const Flown& flown) {
   return paper_cells(flown.on_bench, flown.flights, flown.draws, flown.nominal.pilot.gains);
 }
@@ -195,10 +194,9 @@ void print_text(const FlyRequest& request, const Flown& flown) {
   for (std::size_t i = 0; i < flown.flights.size(); ++i) {
     if (flown.flights[i].lost) fmt::print("{}: lost, more than 1 m from its reference\n", kExperiments[i].name);
   }
-  const Findings findings = judged(flown);
-  if (!flown.draws.empty()) fmt::print("{}", findings_table(findings));
+  if (!flown.draws.empty()) fmt::print("{}", findings_table(flown.findings));
   fmt::print("{}", not_reproduced());
-  if (all_flown(flown)) fmt::print("\n{}", words_of(judgement_of(findings), findings));
+  if (all_flown(flown)) fmt::print("\n{}", words_of(flown.judgement, flown.findings));
 }
 
 Json json_of(const Findings& found) {
@@ -254,10 +252,9 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
     if (flown.flights[i].leg_count > 0) flights.push_back(json_of(kExperiments[i], flown.flights[i]));
   Json out{{"coefficients", request.coefficients}, {"vehicle", request.vehicle}, {"seed", request.seed},
            {"loss_law", name_of(truth.law)},       {"gamma", truth.gamma},       {"flights", flights}};
-  if (!flown.draws.empty()) out["study"] = json_of(findings_of(flown.draws));
+  if (!flown.draws.empty()) out["study"] = json_of(flown.findings);
   if (all_flown(flown)) {
-    const Judgement found = judgement_of(judged(flown));
-    out["verdict"] = {{"fitness", name_of(found.fitness)}, {"doubts", found.doubts}};
+    out["verdict"] = {{"fitness", name_of(flown.judgement.fitness)}, {"doubts", flown.judgement.doubts}};
   }
   out["world"] = {{"file", request.world.empty() ? Json() : Json(request.world)},
                   {"k_t_n_per_rad2_s2", truth.thrust_coefficient.value()},
@@ -271,7 +268,7 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
 ExitCode fly_as_asked(const FlyRequest& request) {
   const Flown flown = fly_requested(request);
   request.json ? print_flights(request, flown) : print_text(request, flown);
-  const bool fit = !all_flown(flown) || judgement_of(judged(flown)).fitness == Fitness::fit_to_fly;
+  const bool fit = !all_flown(flown) || flown.judgement.fitness == Fitness::fit_to_fly;
   return fit ? ExitCode::ok : ExitCode::data_rejected;
 }
 

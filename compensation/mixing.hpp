@@ -76,7 +76,7 @@ class Mixer {
   bool set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale = {}) noexcept;
 
   /// At control rate. The smallest thrusts f (least squares) with A f = demand, iterated for κ(f), if they are within
-  /// the limits. Else, in this order, each as far as those before it allow:
+  /// the limits. Else these, in this order; none may make one before it worse:
   /// 1. yaw stays between 0 and its demand;
   /// 2. roll and pitch miss their demand by as little as can be (least squares);
   /// 3. yaw keeps `assured_yaw` [N m, absolute] of its demand;

@@ -1,4 +1,5 @@
-// The thrusts within the rotors' limits that serve several demands in an order: each as far as those before it allow.
+// The thrusts, within the rotors' limits, that meet several demands in order of priority: none may make an earlier one
+// worse.
 // Bounded least squares, one demand after the other, by an active set: along what the demands before leave free, from
 // limit to limit.
 //

@@ -25,8 +25,9 @@ struct PaperCell {
   Reproduced reproduced = Reproduced::unknown;  ///< unknown without draws
 };
 
-/// The paper's number lies within p10 to p90: `within`; ours is smaller: `better` for an error, but `not_reproduced` in
-/// X, where the real drone's own errors are not modelled, and for what is no error; larger: `not_reproduced`.
+/// `within`: the paper's number lies between p10 and p90. Otherwise `not_reproduced`, unless it is an error in O and
+/// ours is smaller: `better`. In X a smaller error counts for nothing, because the real drone's own errors are not
+/// modelled.
 [[nodiscard]] std::vector<PaperCell> paper_cells(const NineFlights& bench, const NineFlights& world,
                                                  const std::vector<Draw>& draws, const Gains& gains);
 

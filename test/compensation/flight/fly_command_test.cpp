@@ -157,7 +157,7 @@ TEST_F(Fly, FliesInAWorldThatTheControllerDoesNotKnowAndSaysWhetherTheCoefficien
   EXPECT_EQ(told["verdict"]["fitness"], "loses_the_vehicle");
   EXPECT_EQ(told["world"]["file"], world);
   EXPECT_EQ(told["paper"].size(), 51u);
-  EXPECT_EQ(fly({"--world", kVehicle}).code, 2) << "a vehicle is no world";
+  EXPECT_EQ(fly({"--world", kVehicle}).code, 2) << "a vehicle file is not a world file";
 }
 
 TEST_F(Fly, SaysNothingInsteadOfZeroWhereEveryDrawLostAFlight) {
