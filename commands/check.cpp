@@ -129,10 +129,12 @@ std::string summary_of(const profiles::World& world) {
   return fmt::format(
       "  air        K_T {:.4g} N/RPM2, loss {}, gamma {:g}\n"
       "  vehicle    {:g} times its mass, centre of gravity {:+g} {:+g} mm off\n"
-      "  arms       lag {:g} s, backlash {:.3g}°, told {:g} s late\n",
+      "  arms       lag {:g} s, backlash {:.3g}°, told {:g} s late{}\n",
       to_newtons_per_rpm2(truth.thrust_coefficient), name_of(truth.law), truth.gamma, truth.mass,
       1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y(), truth.arms.lag_s, to_degrees(Radians(truth.arms.backlash)),
-      truth.arms.feedback_delay_s);
+      truth.arms.feedback_delay_s,
+      truth.wiring == flight::Truth().wiring ? ""
+                                             : ", WIRED CROSSWISE: the controller takes one arm's angle for another's");
 }
 
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.

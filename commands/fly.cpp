@@ -173,14 +173,16 @@ std::string circumstances(const FlyRequest& request, const Scene& scene) {
   const std::string off = fmt::format(
       "mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm", 100 * (truth.mass - 1),
       fmt::join(percent_off(truth.thrust), " "), 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
+  const std::string wired =
+      truth.wiring == Truth().wiring ? "" : "\nThe controller takes one arm's angle for another's (arm_wiring).";
   return fmt::format(
       "The controller flies with K_T {:.4e} N/(rad/s)^2 and k/K_T from {:.4f} at 0° to {:.4f} at {:g}° ({}).\n"
       "The air, which it does not know: K_T {:.4e} N/(rad/s)^2 ({}), loss \"{}\", gamma = {:g} times as on\n"
-      "the bench. The vehicle differs from its file by: {}. Seed {}.\n\n",
+      "the bench. The vehicle differs from its file by: {}. Seed {}.{}\n\n",
       curve.thrust_coefficient().value(), share(Radians(0)), share(curve.largest_fitted()),
       to_degrees(curve.largest_fitted()), request.coefficients, truth.thrust_coefficient.value(),
       request.world.empty() ? "assumed for three blades of this radius; --world FILE tells another" : request.world,
-      name_of(truth.law), truth.gamma, off, request.seed);
+      name_of(truth.law), truth.gamma, off, request.seed, wired);
 }
 
 std::vector<PaperCell> cells_of(const Flown& flown) {

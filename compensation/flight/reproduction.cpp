@@ -110,10 +110,11 @@ std::vector<PaperCell> paper_cells(const NineFlights& bench, const NineFlights& 
 }
 
 std::string reproduction_table(const std::vector<PaperCell>& cells, double gamma) {
-  std::string text = words(
-      "Beside the paper, no error of assembly in the two columns of gamma%s\n%-42s %-14s %9s %9s %9s",
-      "; a number is within where p10 <= paper <= p90", "", "", "paper", "gamma 1", words("gamma %g", gamma).c_str());
   const bool drawn = !cells.empty() && cells[0].draws > 0;
+  std::string text = words("Beside the paper's Tables I to III%s\n%-42s %-14s %9s %9s %9s",
+                           drawn ? "; within: the paper lies between p10 and p90 of the draws"
+                                 : "; --draws 300 tells how far the numbers spread",
+                           "", "", "paper", "gamma 1", words("gamma %g", gamma).c_str());
   if (drawn) text += "       p10      p50      p90";
   text += "\n";
   for (const PaperCell& cell : cells) {
