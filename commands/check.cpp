@@ -148,6 +148,14 @@ std::string uncertainty_of(const compensation::Coefficients& file) {
                      missing.empty() ? "" : "; unknown and not in it: " + missing);
 }
 
+std::string trend_of(const compensation::ThrustCurve& curve) {
+  const auto& [per_rad_s, reference] = curve.speed_trend();
+  if (per_rad_s == 0) return {};
+  return fmt::format("  speed      k {} by {:.2g} % each 1000 RPM; it is k(φ) at {:.0f} RPM\n",
+                     per_rad_s > 0 ? "rises" : "falls", 100 * std::abs(per_rad_s) * from_rpm(1000).value(),
+                     to_rpm(reference));
+}
+
 std::string summary_of(const compensation::Coefficients& c) {
   std::string doubts;
   for (const std::string& doubt : compensation::doubts_of(c)) doubts += "  doubtful   " + doubt + "\n";
@@ -156,11 +164,11 @@ std::string summary_of(const compensation::Coefficients& c) {
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
       "  curve      k = {} N/(rad/s)^2{}\n"
       "  valid      {:g}° to {:g}°, overlap measured as {}\n"
-      "{}{}",
+      "{}{}{}",
       c.propeller.id, c.propeller.name, c.curve.thrust_coefficient().value(),
-      to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve), c.anchored ? ", anchored at K_T" : "",
-      to_degrees(c.smallest_occlusion), to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()),
-      uncertainty_of(c), doubts);
+      to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve),
+      c.anchored && c.form == "line" ? ", anchored at K_T" : "", to_degrees(c.smallest_occlusion),
+      to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()), trend_of(c.curve), uncertainty_of(c), doubts);
 }
 
 std::string summary_of(const sim::FaultFile& file) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <iostream>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -135,23 +136,26 @@ void hand_on(std::string& buffer, std::ostream& out) {
 // ---- the verb
 
 struct CompensateRequest {
-  std::string coefficients;
+  std::vector<std::string> coefficients;
   std::string vehicle;
   std::string law = "clamped";
   bool json = false;
 };
 
 Compensator compensator_of(const CompensateRequest& request, const profiles::Vehicle& vehicle) {
-  const ThrustCurve curve = load_curve_for(request.coefficients, vehicle);
+  const Rotors<ThrustCurve> curves = load_curves_for(request.coefficients, vehicle);
   const ScalingLaw law = request.law == "published" ? ScalingLaw::published : ScalingLaw::clamped;
-  const BuildOutcome outcome = Compensator::build({curve, curve, curve, curve}, profiles::airframe_of(vehicle), law);
+  const BuildOutcome outcome = Compensator::build(curves, profiles::airframe_of(vehicle), law);
   if (!outcome.compensator) throw ConfigurationError(request.vehicle + ": " + describe(outcome.refusal));
-  if (outcome.doubts[0].gains_with_occlusion) {
-    std::cerr << request.coefficients << ": k(φ) does not fall with the occlusion; check that this is the right file\n";
-  }
-  if (outcome.doubts[0].steps_at_contact) {
-    std::cerr << request.coefficients << ": k(φ) misses K_T at 0°, so the speeds step at first contact; "
-              << "`kphi fit --anchored` avoids this\n";
+  std::set<std::string> told;
+  for (std::size_t i = 0; i < request.coefficients.size(); ++i) {
+    const std::string& file = request.coefficients[i];
+    if (!told.insert(file).second) continue;
+    if (outcome.doubts[i].gains_with_occlusion)
+      std::cerr << file << ": k(φ) does not fall with the occlusion; check that this is the right file\n";
+    if (outcome.doubts[i].steps_at_contact)
+      std::cerr << file << ": k(φ) misses K_T at 0°, so the speeds step at first contact; "
+                << "`kphi fit --anchored` avoids this\n";
   }
   return *outcome.compensator;
 }

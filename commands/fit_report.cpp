@@ -346,8 +346,10 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
       ->check(kExistingPath);
   add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
       ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
+  add_choice(command, "--form", request.options.curve.form,
+             "form of k(φ): a line, or a table from K_T through every occlusion", {CurveForm::line, CurveForm::table});
   command.add_flag("--anchored", request.options.curve.anchored,
-                   "start the curve at K_T (default: free, through the occlusions)");
+                   "start the line at K_T (default: free, through the occlusions)");
   add_value(command, "--points", "DEG,DEG,…", request.options.curve.points_deg,
             "angles that carry the curve, in degrees (default: all above 0)")
       ->delimiter(',');

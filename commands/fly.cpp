@@ -20,7 +20,7 @@ using namespace flight;
 namespace fs = std::filesystem;
 
 struct FlyRequest {
-  std::string coefficients;
+  std::vector<std::string> coefficients;
   std::string vehicle;
   std::string world;
   std::string experiment;
@@ -74,26 +74,28 @@ Truth world_of(const FlyRequest& request, const flight::Vehicle& vehicle) {
 
 Scene nominal_of(const FlyRequest& request) {
   const profiles::Vehicle file = profiles::load_vehicle(request.vehicle);
-  const compensation::ThrustCurve curve = load_curve_for(request.coefficients, file);
+  const auto curves = load_curves_for(request.coefficients, file);
   require_section(file, file.dynamics.has_value(), "dynamics (mass_kg, hub_mass_kg, …)");
   require_section(file, file.control.has_value(), "control (the controller's gains)");
   const flight::Vehicle vehicle = vehicle_of(file);
-  const auto built = compensation::Compensator::build({curve, curve, curve, curve}, vehicle.airframe);
+  const auto built = compensation::Compensator::build(curves, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
-  if (!Pilot::build(vehicle, curve, *file.control)) {
+  if (!Pilot::build(vehicle, curves, *file.control)) {
     throw ConfigurationError(request.vehicle +
                              ": its rotors cannot make every torque in X and in O; check shapes_deg and "
                              "rotor_spins (two of them 1, two -1, neighbours unlike)");
   }
   const Truth world = world_of(request, vehicle);
   const double hover = kGravity * vehicle.build.mass_kg / 4;
-  if (built.compensator->thrust_max()[0].value() < 1.5 * hover) {
+  const auto& thrust_max = built.compensator->thrust_max();
+  const double weakest = std::min_element(thrust_max.begin(), thrust_max.end())->value();
+  if (weakest < 1.5 * hover) {
     throw ConfigurationError(fmt::format(
         "{}: a rotor gives at most {:.2f} N, and hovering with {} kg takes {:.2f} N per rotor; check K_T and "
         "speed_max_rpm",
-        request.coefficients, built.compensator->thrust_max()[0].value(), vehicle.build.mass_kg, hover));
+        fmt::join(request.coefficients, ", "), weakest, vehicle.build.mass_kg, hover));
   }
-  return nominal_scene(vehicle, *file.control, curve, world, request.seed);
+  return nominal_scene(vehicle, *file.control, curves, world, request.seed);
 }
 
 void make_folder(const std::string& path) {
@@ -168,19 +170,24 @@ std::array<double, 4> percent_off(const std::array<double, 4>& shares) {
 
 std::string circumstances(const FlyRequest& request, const Scene& scene) {
   const Truth& truth = scene.truth;
-  const compensation::ThrustCurve& curve = scene.curve;
-  const auto share = [&](Radians phi) { return curve.at(phi) / curve.thrust_coefficient(); };
+  std::string known;
+  for (std::size_t i = 0; i < request.coefficients.size(); ++i) {
+    const compensation::ThrustCurve& curve = scene.curves[i];
+    const auto share = [&](Radians phi) { return curve.at(phi) / curve.thrust_coefficient(); };
+    known += fmt::format("{}K_T {:.4e} N/(rad/s)^2 and k/K_T from {:.4f} at 0° to {:.4f} at {:g}° ({})",
+                         i == 0 ? "" : ",\n", curve.thrust_coefficient().value(), share(Radians(0)),
+                         share(curve.largest_fitted()), to_degrees(curve.largest_fitted()), request.coefficients[i]);
+  }
   const std::string off = fmt::format(
       "mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm", 100 * (truth.mass - 1),
       fmt::join(percent_off(truth.thrust), " "), 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
   const std::string wired =
       truth.wiring == Truth().wiring ? "" : "\nThe controller takes one arm's angle for another's (arm_wiring).";
   return fmt::format(
-      "The controller flies with K_T {:.4e} N/(rad/s)^2 and k/K_T from {:.4f} at 0° to {:.4f} at {:g}° ({}).\n"
+      "The controller flies with {}.\n"
       "The air, which it does not know: K_T {:.4e} N/(rad/s)^2 ({}), loss \"{}\", gamma = {:g} times as on\n"
       "the bench. The vehicle differs from its file by: {}. Seed {}.{}\n\n",
-      curve.thrust_coefficient().value(), share(Radians(0)), share(curve.largest_fitted()),
-      to_degrees(curve.largest_fitted()), request.coefficients, truth.thrust_coefficient.value(),
+      known, truth.thrust_coefficient.value(),
       request.world.empty() ? "assumed for three blades of this radius; --world FILE tells another" : request.world,
       name_of(truth.law), truth.gamma, off, request.seed, wired);
 }
@@ -252,8 +259,10 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
   Json flights = Json::array();
   for (std::size_t i = 0; i < flown.flights.size(); ++i)
     if (flown.flights[i].leg_count > 0) flights.push_back(json_of(kExperiments[i], flown.flights[i]));
-  Json out{{"coefficients", request.coefficients}, {"vehicle", request.vehicle}, {"seed", request.seed},
-           {"loss_law", name_of(truth.law)},       {"gamma", truth.gamma},       {"flights", flights}};
+  const Json coefficients =
+      request.coefficients.size() == 1 ? Json(request.coefficients[0]) : Json(request.coefficients);
+  Json out{{"coefficients", coefficients},   {"vehicle", request.vehicle}, {"seed", request.seed},
+           {"loss_law", name_of(truth.law)}, {"gamma", truth.gamma},       {"flights", flights}};
   if (!flown.draws.empty()) out["study"] = json_of(flown.findings);
   if (all_flown(flown)) {
     out["verdict"] = {{"fitness", name_of(flown.judgement.fitness)}, {"doubts", flown.judgement.doubts}};

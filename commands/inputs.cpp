@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "base/number.hpp"
@@ -187,8 +188,11 @@ FittedFolder fitted_again(const std::string& folder) {
   return {std::move(input), {std::move(identification), std::move(analysis)}};
 }
 
-void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle) {
-  add_value(command, "--coefficients", "FILE", coefficients, "coefficients.yaml of `kphi fit`")->required();
+void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients, std::string& vehicle) {
+  add_value(command, "--coefficients", "FILE[,FILE,FILE,FILE]", coefficients,
+            "coefficients.yaml of `kphi fit`; four, in the order of the rotors, where propellers differ")
+      ->delimiter(',')
+      ->required();
   add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
 }
 
@@ -202,13 +206,25 @@ void print_doubts(const std::string& path, const std::vector<std::string>& doubt
   for (const std::string& doubt : doubts) fmt::print(stderr, "doubtful      {}: {}\n", path, doubt);
 }
 
-compensation::ThrustCurve load_curve_for(const std::string& coefficients, const profiles::Vehicle& vehicle) {
-  const compensation::Coefficients file = load_sealed_coefficients(coefficients);
-  print_doubts(coefficients, compensation::doubts_of(file));
-  const compensation::ThrustCurve curve = file.curve;
-  const auto mismatch = compensation::overlap_mismatch(curve.overlap(), coefficients, vehicle.overlap, vehicle.path);
-  if (mismatch) throw ConfigurationError(*mismatch);
-  return curve;
+compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vector<std::string>& coefficients,
+                                                                const profiles::Vehicle& vehicle) {
+  constexpr std::size_t kRotors = 4;
+  if (coefficients.size() != 1 && coefficients.size() != kRotors)
+    throw ConfigurationError(
+        fmt::format("--coefficients names {} files, but the vehicle has {} rotors; give one file "
+                    "for all of them, or one for each",
+                    coefficients.size(), kRotors));
+  std::map<std::string, compensation::ThrustCurve> curves;
+  for (const std::string& path : coefficients) {
+    if (curves.contains(path)) continue;
+    const compensation::Coefficients file = load_sealed_coefficients(path);
+    print_doubts(path, compensation::doubts_of(file));
+    const auto mismatch = compensation::overlap_mismatch(file.curve.overlap(), path, vehicle.overlap, vehicle.path);
+    if (mismatch) throw ConfigurationError(*mismatch);
+    curves.emplace(path, file.curve);
+  }
+  const auto of = [&](std::size_t rotor) { return curves.at(coefficients[coefficients.size() == 1 ? 0 : rotor]); };
+  return {of(0), of(1), of(2), of(3)};
 }
 
 void add_live_options(CLI::App& command, daq::live::LiveOptions& options) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "compensation/file/coefficient_file.hpp"
+#include "compensation/rotors.hpp"
 #include "compensation/thrust_curve.hpp"
 #include "daq/live/live_session.hpp"
 #include "fit/coefficients/coefficients.hpp"
@@ -22,9 +23,9 @@ struct FitInput {
   std::vector<results::StepMean> steps;
   std::vector<fit::CurvePoint> table;  ///< instead of steps
   fit::Provenance provenance;
-  std::filesystem::path folder;  ///< where the outputs go
-  bool campaign = false;         ///< `folder` is a campaign folder
-  bool mounted_once = false;     ///< one mounting for all repetitions of an occlusion
+  std::filesystem::path folder;           ///< where the outputs go
+  bool campaign = false;                  ///< `folder` is a campaign folder
+  bool mounted_once = false;              ///< one mounting for all repetitions of an occlusion
   std::optional<double> u_calibration{};  ///< relative, of the load cell, by the weighing in provenance.cell_weighed
 };
 
@@ -47,15 +48,16 @@ struct FittedFolder {
 [[nodiscard]] std::filesystem::path coefficient_file_of(const std::string& path);
 
 /// `--coefficients` and `--vehicle`, both required.
-void add_flight_files(CLI::App& command, std::string& coefficients, std::string& vehicle);
+void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients, std::string& vehicle);
 /// As compensation::load_coefficients. Throws DataRejected if the file was changed since it was written.
 [[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path);
 /// Says on stderr, one line each, what of the coefficients is unlike any propeller or stand.
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts);
 
-/// The curve of a coefficient file. Throws ConfigurationError if file and vehicle measure φ differently.
-[[nodiscard]] compensation::ThrustCurve load_curve_for(const std::string& coefficients,
-                                                       const profiles::Vehicle& vehicle);
+/// The curves of the vehicle's four rotors, from one coefficient file for all or one for each. Throws
+/// ConfigurationError for another number of files, or if a file and the vehicle measure φ differently.
+[[nodiscard]] compensation::Rotors<compensation::ThrustCurve> load_curves_for(
+    const std::vector<std::string>& coefficients, const profiles::Vehicle& vehicle);
 
 /// Adds `--live [PORT]` and `--udp-json HOST:PORT`; `options` must outlive the command.
 void add_live_options(CLI::App& command, daq::live::LiveOptions& options);

@@ -111,6 +111,7 @@ Compensator::Compensator(const Rotors<ThrustCurve>& curves, const Airframe& airf
       curves_(curves),
       airframe_(airframe),
       contact_free_(curves.size()) {
+  for (const ThrustCurve& curve : curves) speed_trends_ = speed_trends_ || std::fabs(curve.speed_trend().per_rad_s) > 0;
   for (std::size_t i = 0; i < rotors(); ++i) {
     contact_free_[i] = window_of(airframe, i);
     apply_occlusion(i);
@@ -182,8 +183,9 @@ void Compensator::apply_occlusion(std::size_t rotor) noexcept {
       std::max(curve.thrust_coefficient().value() * scaling * density_ratio_, std::numeric_limits<Real>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
-  thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_));
-  drag_scale_[rotor] = 1 / std::max(scaling, kScalingFloor);
+  const Real at_fastest = follows_trends() ? curve.speed_trend().factor_at(fastest_) : Real(1);
+  thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_) * at_fastest);
+  drag_scale_[rotor] = (covered ? curve.torque_share_at(phi) : Real(1)) / std::max(scaling, kScalingFloor);
   arm_flags_[rotor] =
       arm_flags_[rotor]
           .with(Flag::beyond_fit, phi > curve.largest_fitted())
@@ -202,6 +204,7 @@ SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexc
       possible[i] = asked[i] > 0 ? asked[i] : Real(0);  // NaN compares false
       wanted[i] = std::sqrt(possible[i] / effective_coefficients_[i]);
     }
+    if (follows_trends()) follow_trends(wanted);
     for (std::size_t i = 0; i < count; ++i) {
       const Real raised = wanted[i] < slowest_ ? slowest_ : wanted[i];
       held[i] = raised > fastest_ ? fastest_ : raised;
@@ -215,6 +218,10 @@ SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexc
   constexpr bool kVectors = sizeof(Real) == sizeof(double);
   kVectors&& rotors() == 4 ? in_passes(std::integral_constant<std::size_t, 4>()) : in_passes(rotors());
   return command;
+}
+
+void Compensator::follow_trends(Real (&speeds)[kMostRotors]) const noexcept {
+  for (std::size_t i = 0; i < rotors(); ++i) speeds[i] = curves_[i].speed_trend().speed_for(speeds[i]);
 }
 
 void Compensator::flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors],
@@ -233,8 +240,7 @@ Rotors<Newtons> Compensator::uncovered_thrusts(const Rotors<Newtons>& thrusts) c
   for (std::size_t i = 0; i < rotors(); ++i) {
     const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);
     const Real coefficient = curves_[i].thrust_coefficient().value() * density_ratio_;
-    uncovered[i] =
-        Newtons(std::min(possible * (coefficient / effective_coefficients_[i]), coefficient * (fastest_ * fastest_)));
+    uncovered[i] = std::min(Newtons(possible), thrust_max_[i]) * (coefficient / effective_coefficients_[i]);
   }
   return uncovered;
 }

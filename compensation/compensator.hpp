@@ -80,7 +80,8 @@ class Compensator {
   void set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback& feedback = {}) noexcept;
 
   /// At control rate. ω = sqrt(max(T, 0) / (K_T k_i)) (equation 4), held between slowest and fastest; never NaN.
-  /// Where nothing is covered this is sqrt(T / K_T) bit for bit. Missing thrusts count as 0.
+  /// Where nothing is covered this is sqrt(T / K_T) bit for bit, unless the curve changes with the speed (SpeedTrend).
+  /// Missing thrusts count as 0.
   [[nodiscard]] SpeedCommand speeds_for(const Rotors<Newtons>& thrusts) const noexcept;
 
   /// The way in without a speed loop: the thrusts T/k_i [N] that a map of the uncovered propeller, such as the flight
@@ -93,8 +94,8 @@ class Compensator {
   [[nodiscard]] Rotors<RadPerSec> speed_uncertainties(const Rotors<Newtons>& thrusts,
                                                       Radians arm_angle_uncertainty = Radians(0)) const noexcept;
 
-  /// Compensated or not. When off every k_i is 1 and speeds_for is the plain map bit for bit; φ is followed all the
-  /// same.
+  /// Compensated or not. When off every k_i is 1, no curve changes with the speed, and speeds_for is the plain map bit
+  /// for bit; φ is followed all the same.
   void enable(bool on) noexcept;
   /// Whether it compensates; it does from the beginning.
   [[nodiscard]] bool enabled() const noexcept { return enabled_; }
@@ -118,7 +119,7 @@ class Compensator {
   [[nodiscard]] const Rotors<Real>& scaling_factors() const noexcept { return scaling_factors_; }
   /// K_T k_i ω_fastest², in the air of now: what each rotor can give, for the saturation before this map.
   [[nodiscard]] const Rotors<Newtons>& thrust_max() const noexcept { return thrust_max_; }
-  /// 1/k_i: torque follows ω², so torque per thrust grows by this; for the allocation. At most 1/kScalingFloor.
+  /// 1/k_i times the curve's torque share at φ: by this the torque per thrust grows; for the allocation.
   [[nodiscard]] const Rotors<Real>& drag_scale() const noexcept { return drag_scale_; }
   /// Of the shape that the last set_arms told, for Mixer::set_layout, which refuses it where no angle is known yet.
   [[nodiscard]] RotorLayout layout(const Masses& masses, const Rotors<int>& spins) const noexcept {
@@ -133,6 +134,8 @@ class Compensator {
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
+  [[nodiscard]] bool follows_trends() const noexcept { return enabled_ && speed_trends_; }
+  void follow_trends(Real (&speeds)[kMostRotors]) const noexcept;
   /// Adds what was done to these thrusts and to the speeds that they want.
   void flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
 
@@ -142,6 +145,7 @@ class Compensator {
   Real fastest_;
   Rotors<Flags> arm_flags_;
   bool enabled_ = true;
+  bool speed_trends_ = false;  // of any curve
   ScalingLaw law_;
   Rotors<Radians> arm_angles_;
   Rotors<Radians> occlusion_angles_;

@@ -1,5 +1,6 @@
 #include "compensation/kphi_compensation.h"
 
+#include <cmath>
 #include <cstddef>
 #include <new>
 
@@ -14,7 +15,8 @@ using namespace kphi::compensation;
 
 static_assert(sizeof(Compensator) <= sizeof(kphi_compensator) && alignof(Compensator) <= alignof(kphi_compensator));
 static_assert(sizeof(Mixer) <= sizeof(kphi_mixer) && alignof(Mixer) <= alignof(kphi_mixer));
-static_assert(KPHI_MAX_CORNERS == ConvexPolygon::kMaxCorners && KPHI_MAX_ROTORS == kMostRotors);
+static_assert(KPHI_MAX_CORNERS == ConvexPolygon::kMaxCorners && KPHI_MAX_ROTORS == kMostRotors &&
+              KPHI_MAX_KNOTS == kMostKnots);
 static_assert(KPHI_ARM_ANGLE_STALE == static_cast<int>(Flag::arm_angle_stale) &&
               KPHI_THRUST_NAN == static_cast<int>(Flag::thrust_nan));
 static_assert(KPHI_LOAD_SHARE == static_cast<int>(OverlapMeasure::load_share));
@@ -23,7 +25,7 @@ static_assert(KPHI_LAW_PUBLISHED == static_cast<int>(ScalingLaw::published));
 static_assert(sizeof(unsigned short) == sizeof(Flags));
 
 /// Codes of kphi_compensator_build beyond those of Refusal; kphi_refusal_text has their words in the same order.
-enum MoreRefusals : int { kBadLine = 100, kBadOutline, kBadLaw, kBadOverlap };
+enum MoreRefusals : int { kBadCurve = 100, kBadOutline, kBadLaw, kBadOverlap };
 
 Compensator& of(kphi_compensator* c) noexcept { return *std::launder(reinterpret_cast<Compensator*>(c->state)); }
 const Compensator& of(const kphi_compensator* c) noexcept {
@@ -57,16 +59,41 @@ std::optional<OverlapMeasure> measure_of(int code) noexcept {
   return static_cast<OverlapMeasure>(code);
 }
 
-std::optional<ThrustCurve> curve_of(const kphi_line& line) noexcept {
-  const auto overlap = measure_of(line.overlap);
-  if (!overlap) return std::nullopt;
-  std::optional<LineUncertainty> uncertainty;
-  if (line.has_uncertainty != 0) {
-    uncertainty =
-        LineUncertainty{line.thrust_coefficient_error, line.intercept_variance, line.covariance, line.slope_variance};
+std::optional<OcclusionTable> table_of(const kphi_knot* knots, int count) noexcept {
+  if (count < 0 || count > KPHI_MAX_KNOTS) return std::nullopt;
+  Knot taken[KPHI_MAX_KNOTS];
+  for (int i = 0; i < count; ++i) taken[i] = {Radians(knots[i].phi_rad), knots[i].value, knots[i].error};
+  return OcclusionTable::from(taken, static_cast<std::size_t>(count));
+}
+
+/// k(φ) alone.
+std::optional<ThrustCurve> form_of(const kphi_curve& curve, OverlapMeasure overlap) noexcept {
+  const Radians largest(curve.largest_fitted_rad);
+  if (curve.knot_count != 0) {
+    const auto k = table_of(curve.knots, curve.knot_count);
+    return k ? ThrustCurve::from_table(*k, largest, overlap) : std::nullopt;
   }
-  return ThrustCurve::from_line(ThrustCoefficient(line.thrust_coefficient), ThrustCoefficient(line.intercept),
-                                line.slope_per_rad, Radians(line.largest_fitted_rad), *overlap, uncertainty);
+  std::optional<LineUncertainty> uncertainty;
+  if (curve.has_uncertainty != 0) {
+    uncertainty = LineUncertainty{curve.thrust_coefficient_error, curve.intercept_variance, curve.covariance,
+                                  curve.slope_variance};
+  }
+  return ThrustCurve::from_line(ThrustCoefficient(curve.thrust_coefficient), ThrustCoefficient(curve.intercept),
+                                curve.slope_per_rad, largest, overlap, uncertainty);
+}
+
+std::optional<ThrustCurve> curve_of(const kphi_curve& from) noexcept {
+  const auto overlap = measure_of(from.overlap);
+  auto curve = overlap ? form_of(from, *overlap) : std::nullopt;
+  if (curve && from.torque_count != 0) {
+    const auto share = table_of(from.torque, from.torque_count);
+    if (!share || !curve->set_torque_share(*share)) return std::nullopt;
+  }
+  const bool trend = !(std::fabs(from.trend_per_rad_s) <= 0);
+  if (curve && trend && !curve->set_speed_trend({from.trend_per_rad_s, RadPerSec(from.trend_reference)})) {
+    return std::nullopt;
+  }
+  return curve;
 }
 
 std::size_t rotors_of(const kphi_airframe& airframe) noexcept {
@@ -116,7 +143,7 @@ extern "C" {
 
 const char* kphi_compensation_version(void) { return KPHI_COMPENSATION_VERSION; }
 
-int kphi_compensator_build(kphi_compensator* out, const kphi_line* lines, const kphi_airframe* airframe, int law) {
+int kphi_compensator_build(kphi_compensator* out, const kphi_curve* curves, const kphi_airframe* airframe, int law) {
   if (law != KPHI_LAW_CLAMPED && law != KPHI_LAW_PUBLISHED) return kBadLaw;
   const auto overlap = measure_of(airframe->overlap);
   if (!overlap) return kBadOverlap;
@@ -127,15 +154,15 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line* lines, const 
     frame.polygon = body_of(*airframe);
     if (!frame.polygon) return kBadOutline;
   }
-  const auto first = curve_of(lines[0]);
-  if (!first) return kBadLine;
-  Rotors<ThrustCurve> curves(count, *first);
+  const auto first = curve_of(curves[0]);
+  if (!first) return kBadCurve;
+  Rotors<ThrustCurve> each(count, *first);
   for (std::size_t i = 1; i < count; ++i) {
-    const auto curve = curve_of(lines[i]);
-    if (!curve) return kBadLine;
-    curves[i] = *curve;
+    const auto curve = curve_of(curves[i]);
+    if (!curve) return kBadCurve;
+    each[i] = *curve;
   }
-  const BuildOutcome outcome = Compensator::build(curves, frame, static_cast<ScalingLaw>(law));
+  const BuildOutcome outcome = Compensator::build(each, frame, static_cast<ScalingLaw>(law));
   if (!outcome.compensator) return static_cast<int>(outcome.refusal);
   ::new (out->state) Compensator(*outcome.compensator);
   return 0;
@@ -143,18 +170,20 @@ int kphi_compensator_build(kphi_compensator* out, const kphi_line* lines, const 
 
 const char* kphi_refusal_text(int refusal) {
   static constexpr const char* kMore[] = {
-      ("a line needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap measure, "
-       "and variances that are not negative"),
+      ("a curve needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi], a known overlap measure, "
+       "variances that are not negative; a table 2 to 12 knots from phi = 0 on with k > 0 that does not rise; shares "
+       "of the torque in (0, 10); a speed trend a reference > 0, and at most 0.3 of k down to rest"),
       "the body must have 3 to 12 corners, finite, counter-clockwise and convex",
       "the law is neither KPHI_LAW_CLAMPED nor KPHI_LAW_PUBLISHED",
       "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE"};
-  if (refusal >= kBadLine && refusal < kBadLine + static_cast<int>(std::size(kMore))) return kMore[refusal - kBadLine];
+  if (refusal >= kBadCurve && refusal < kBadCurve + static_cast<int>(std::size(kMore)))
+    return kMore[refusal - kBadCurve];
   const bool known = refusal >= 0 && refusal <= static_cast<int>(Refusal::arm_limits);
   return known ? describe(static_cast<Refusal>(refusal)) : "unknown refusal";
 }
 
-int kphi_line_doubts(const kphi_line* line, int law) {
-  const auto curve = curve_of(*line);
+int kphi_curve_doubts(const kphi_curve* from, int law) {
+  const auto curve = curve_of(*from);
   if (!curve) return -1;
   const CurveDoubts doubts =
       doubts_about(*curve, law == KPHI_LAW_PUBLISHED ? ScalingLaw::published : ScalingLaw::clamped);

@@ -50,13 +50,21 @@ enum {
 };
 // What the mixer gave up (mixing.hpp).
 enum { KPHI_GAVE_YAW = 1, KPHI_GAVE_THRUST = 2, KPHI_GAVE_ROLL_PITCH = 4, KPHI_DEMAND_NAN = 8 };
-// What deserves a look before a line is flown (compensator.hpp).
+// What deserves a look before a curve is flown (compensator.hpp).
 enum { KPHI_GAINS_WITH_OCCLUSION = 1, KPHI_STEPS_AT_CONTACT = 2 };
 
-enum { KPHI_MAX_CORNERS = 12, KPHI_MAX_ROTORS = 8 };
+enum { KPHI_MAX_CORNERS = 12, KPHI_MAX_ROTORS = 8, KPHI_MAX_KNOTS = 12 };
 
-// k(phi) = intercept + slope phi of one propeller, K_T measured without occlusion. Zero-initialise, then fill in.
-typedef struct kphi_line {
+// A value at one phi; between two of them straight.
+typedef struct kphi_knot {
+  kphi_real phi_rad;  // the first 0, ascending
+  kphi_real value;
+  kphi_real error;  // standard uncertainty; HUGE_VAL: unknown
+} kphi_knot;
+
+// What the bench knows of one propeller: k(phi) = intercept + slope phi with K_T measured without occlusion, or a table.
+// Zero-initialise, then fill in.
+typedef struct kphi_curve {
   kphi_real thrust_coefficient;  // K_T, > 0
   kphi_real intercept;           // > 0
   kphi_real slope_per_rad;
@@ -67,7 +75,13 @@ typedef struct kphi_line {
   kphi_real intercept_variance;
   kphi_real covariance;
   kphi_real slope_variance;
-} kphi_line;
+  int knot_count;                    // 0: the line; else 2 to 12, and largest_fitted_rad and overlap alone count of the above
+  kphi_knot knots[KPHI_MAX_KNOTS];   // k, positive, not rising; the first is K_T
+  int torque_count;                  // 0: the drag torque does not depend on phi
+  kphi_knot torque[KPHI_MAX_KNOTS];  // drag torque as a share of that at phi 0, at one speed; in (0, 10)
+  kphi_real trend_per_rad_s;         // k at w is k(phi) (1 + trend (w - reference)); 0: does not depend on it
+  kphi_real trend_reference;         // > 0, times the trend at most 0.3
+} kphi_curve;
 
 // Zero-initialise, then fill in. corner_count 0: the square |x|, |y| <= half_side with four arms, arm i hinged at the
 // corner (half_side, half_side) turned by hinge_turns[i] times 90 degrees. Else a convex body with 3 to 8 arms, corners
@@ -81,7 +95,7 @@ typedef struct kphi_airframe {
   int rotors;          // 3 to 8; 0: 4
   int hinge_turns[4];  // 0, 1, 2, 3 in any order
   int mirrored[KPHI_MAX_ROTORS];
-  int overlap;  // KPHI_RIM_ARC ..: the measure of the flight; must be that of every line
+  int overlap;  // KPHI_RIM_ARC ..: the measure of the flight; must be that of every curve
   int corner_count;
   kphi_real corners[KPHI_MAX_CORNERS][2];
   kphi_real hinges[KPHI_MAX_ROTORS][2];
@@ -103,14 +117,14 @@ typedef struct kphi_masses {
 
 // Opaque; plain bytes. Arrays in the calls below hold a number for each of its rotors.
 typedef struct kphi_compensator {
-  double state[640];
+  double state[1280];
 } kphi_compensator;
 
-// 0, or why not: kphi_refusal_text() says it in words. Nothing is built then. A line for each rotor.
-int kphi_compensator_build(kphi_compensator* out, const kphi_line* lines, const kphi_airframe* airframe, int law);
+// 0, or why not: kphi_refusal_text() says it in words. Nothing is built then. A curve for each rotor.
+int kphi_compensator_build(kphi_compensator* out, const kphi_curve* curves, const kphi_airframe* airframe, int law);
 const char* kphi_refusal_text(int refusal);
-// The sum of what speaks against flying the line (KPHI_GAINS_WITH_OCCLUSION, KPHI_STEPS_AT_CONTACT); -1: it is no line.
-int kphi_line_doubts(const kphi_line* line, int law);
+// The sum of what speaks against flying the curve (KPHI_GAINS_WITH_OCCLUSION, KPHI_STEPS_AT_CONTACT); -1: it is none.
+int kphi_curve_doubts(const kphi_curve* curve, int law);
 
 // At servo rate: phi [rad, 0 .. 2 pi] and k_i of the arms that moved. An angle that is not finite, or outside the arm's
 // limits, keeps the last phi and raises KPHI_ARM_ANGLE_UNKNOWN or KPHI_ARM_ANGLE_BEYOND.
@@ -140,7 +154,7 @@ void kphi_occlusion_angles(const kphi_compensator* compensator, kphi_real* angle
 void kphi_scaling_factors(const kphi_compensator* compensator, kphi_real* factors);
 // K_T k_i fastest_speed^2, for the mixer's limits.
 void kphi_thrust_max(const kphi_compensator* compensator, kphi_real* thrusts_n);
-// 1/k_i: torque per thrust grows by this, for the mixer.
+// 1/k_i times the torque's share: torque per thrust grows by this, for the mixer.
 void kphi_drag_scale(const kphi_compensator* compensator, kphi_real* scales);
 // Hubs about the centre of gravity of the shape of the last arm angles, for the mixer; NaN before the first.
 void kphi_hubs(const kphi_compensator* compensator, const kphi_masses* masses, kphi_real (*hubs)[2]);

@@ -1,6 +1,6 @@
-// k(φ) of one propeller, as fitted on the bench (paper, Fig. 5 and equation 4): the one type that all code after the
-// fit asks. Its form, today a line, is its own affair: only what writes or prints the parameters calls visit(), with a
-// function for each form, so that where another form is missing does not compile.
+// What the bench knows of one propeller: k(φ) (paper, Fig. 5 and equation 4), how it changes with the speed, and what φ
+// does to the drag torque. The one type that all code after the fit asks. Whether k(φ) is a line or a table is its own
+// affair: only what writes or prints the parameters calls visit(), with a function for each form.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "compensation/convex_polygon.hpp"
+#include "compensation/occlusion_table.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::compensation {
@@ -37,6 +38,21 @@ struct Line {
   std::optional<LineUncertainty> uncertainty{};
 };
 
+/// k at the speed ω is k(φ) (1 + per_rad_s (ω − reference)), the bracket held within kMost of 1. On small propellers it
+/// rises by a fifth over the speeds of a sweep.
+struct SpeedTrend {
+  static constexpr Real kMost = Real(0.3);
+  Real per_rad_s = 0;   ///< 0: k does not depend on the speed
+  RadPerSec reference;  ///< where k is k(φ) [rad/s], positive
+
+  [[nodiscard]] Real factor_at(Real speed) const noexcept {
+    return std::min(1 + kMost, std::max(1 - kMost, 1 + per_rad_s * (speed - reference.value())));
+  }
+  /// The speed [rad/s] with the thrust that `plain` would have without the trend. Within 1e-9 of itself where k changes
+  /// by a fifth up to there; in double.
+  [[nodiscard]] Real speed_for(Real plain) const noexcept;
+};
+
 /// T = k(φ) ω². A ThrustCurve that exists is valid.
 class ThrustCurve {
  public:
@@ -48,6 +64,22 @@ class ThrustCurve {
       ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept, Real slope_per_rad, Radians largest_fitted,
       OverlapMeasure overlap = OverlapMeasure::rim_arc,
       const std::optional<LineUncertainty>& uncertainty = std::nullopt) noexcept;
+  /// k [N/(rad/s)²] at its knots, K_T the first of them: for a propeller that follows no line. nullopt unless the table
+  /// holds positive k that do not rise, and `largest_fitted` is in (0, 2π].
+  [[nodiscard]] static std::optional<ThrustCurve> from_table(const OcclusionTable& k, Radians largest_fitted,
+                                                             OverlapMeasure overlap = OverlapMeasure::rim_arc) noexcept;
+
+  /// False, and nothing is changed, unless the numbers are finite, the reference positive and the change down to rest,
+  /// per_rad_s · reference, at most SpeedTrend::kMost.
+  bool set_speed_trend(const SpeedTrend& trend) noexcept;
+  [[nodiscard]] const SpeedTrend& speed_trend() const noexcept { return speed_trend_; }
+
+  /// Drag torque at φ as a share of that without occlusion, at one and the same speed. False, and nothing is changed,
+  /// unless each is in (0, 10). Without it the torque is taken not to depend on φ.
+  bool set_torque_share(const OcclusionTable& share) noexcept;
+  [[nodiscard]] Real torque_share_at(Radians occlusion_angle) const noexcept {
+    return torque_share_.empty() ? Real(1) : std::max(Real(0.1), torque_share_.at(occlusion_angle));
+  }
 
   /// K_T [N/(rad/s)²], positive.
   [[nodiscard]] ThrustCoefficient thrust_coefficient() const noexcept { return thrust_coefficient_; }
@@ -56,19 +88,25 @@ class ThrustCurve {
   /// How the φ of the fit is measured; the flight must measure it the same way.
   [[nodiscard]] OverlapMeasure overlap() const noexcept { return overlap_; }
 
-  /// Calls `of_form(const Line&)`, for whatever writes or prints the parameters, and returns what it returns.
-  template <class OfForm>
-  decltype(auto) visit(OfForm&& of_form) const {
-    return of_form(line_);
+  /// Calls `of_line(const Line&)` or `of_table(const OcclusionTable&)`, for whatever writes or prints the parameters,
+  /// and returns what it returns.
+  template <class OfLine, class OfTable>
+  decltype(auto) visit(OfLine&& of_line, OfTable&& of_table) const {
+    return table_.empty() ? of_line(line_) : of_table(table_);
   }
-  [[nodiscard]] bool has_uncertainty() const noexcept { return line_.uncertainty.has_value(); }
+  [[nodiscard]] bool has_uncertainty() const noexcept;
 
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
   [[nodiscard]] ThrustCoefficient at(Radians occlusion_angle) const noexcept {
+    if (!table_.empty()) return ThrustCoefficient(table_.at(occlusion_angle));
     return line_.intercept + ThrustCoefficient(line_.slope_per_rad * occlusion_angle.value());
   }
   /// Standard uncertainty of k(φ) [N/(rad/s)²]; +∞ if unknown.
   [[nodiscard]] Real standard_error_at(Radians occlusion_angle) const noexcept;
+  /// The part of it by which k may bend away between two knots of a table; 0 of a line.
+  [[nodiscard]] Real bend_error_at(Radians occlusion_angle) const noexcept {
+    return table_.empty() ? Real(0) : table_.bend_error_at(occlusion_angle);
+  }
   /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
   [[nodiscard]] Real scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept {
     const Real reference = thrust_coefficient_.value();
@@ -85,10 +123,7 @@ class ThrustCurve {
 
   /// The curve raised by `raised` everywhere, with what it changes over φ times `steepness`; K_T and everything else
   /// stays. nullopt if k(0) is not positive then.
-  [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, Real steepness) const noexcept {
-    return from_line(thrust_coefficient_, line_.intercept + raised, line_.slope_per_rad * steepness, largest_fitted_,
-                     overlap_, line_.uncertainty);
-  }
+  [[nodiscard]] std::optional<ThrustCurve> perturbed(ThrustCoefficient raised, Real steepness) const noexcept;
 
  private:
   ThrustCurve(ThrustCoefficient thrust_coefficient, const Line& line, Radians largest_fitted,
@@ -96,7 +131,10 @@ class ThrustCurve {
       : thrust_coefficient_(thrust_coefficient), line_(line), largest_fitted_(largest_fitted), overlap_(overlap) {}
 
   ThrustCoefficient thrust_coefficient_;
-  Line line_;
+  Line line_;             // where there is no table
+  OcclusionTable table_;  // of k
+  OcclusionTable torque_share_;
+  SpeedTrend speed_trend_;
   Radians largest_fitted_;
   OverlapMeasure overlap_;
 };

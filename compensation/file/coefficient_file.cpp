@@ -222,12 +222,38 @@ std::optional<ThrustCurve> read_line(const Value& top, ThrustCoefficient k_t, do
   return ThrustCurve::from_line(k_t, intercept, slope, largest, overlap_of(top), uncertainty);
 }
 
+constexpr const char* kKnotHasNoKeys = "a knot has no keys";
+
+std::optional<ThrustCurve> read_table(const Value& top, ThrustCoefficient k_t, double scale, Radians largest) {
+  std::vector<Knot> knots;
+  double least = 0;
+  const Value block = top.map_at("curve");
+  for (const Value& row : block.rows("knots", kKnotHasNoKeys)) {
+    const Radians at = from_degrees(row.at("phi_deg").number());
+    const double k = row.at("value").number() * scale;
+    if (!(k > 0)) row.at("value").refuse("a k of the table is not positive", kFitAgain);
+    if (!knots.empty() && !(at > knots.back().occlusion))
+      row.at("phi_deg").refuse("the knots do not ascend", kFitAgain);
+    if (!knots.empty() && k > least) row.at("value").refuse("k of the table rises with phi_deg", kFitAgain);
+    least = k;
+    const auto u = read_uncertainty(row, scale);
+    knots.push_back({at, k, u ? u->u : std::numeric_limits<double>::infinity()});
+  }
+  if (knots.size() < 2 || knots.size() > kMostKnots)
+    block.refuse("a table needs 2 to " + std::to_string(kMostKnots) + " knots", kFitAgain);
+  if (knots.front().occlusion.value() != 0.0 || std::fabs(knots.front().value / k_t.value() - 1.0) > kAnchorTolerance)
+    block.at("knots").refuse("the first knot is not K_T at phi_deg 0", kFitAgain);
+  knots.front().value = k_t.value();
+  const auto k = OcclusionTable::from(knots.data(), knots.size());
+  return k ? ThrustCurve::from_table(*k, largest, overlap_of(top)) : std::nullopt;
+}
+
 /// A form of `curve.form` with what reads it.
 struct FormReader {
   const char* name;
   std::optional<ThrustCurve> (*read)(const Value& top, ThrustCoefficient k_t, double scale, Radians largest);
 };
-constexpr FormReader kForms[] = {{"line", read_line}};
+constexpr FormReader kForms[] = {{"line", read_line}, {"table", read_table}};
 
 ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
   const ThrustCoefficient k_t = read_thrust_coefficient(top.map_at("K_T"), scale);
@@ -249,6 +275,9 @@ std::vector<Coefficients::Parameter> read_parameters(const Value& block, double 
   for (const auto& [key, value] : block.entries())
     if (value.node().IsMap() && value.find("value"))
       parameters.push_back({key, value.at("value").number() * scale, read_uncertainty(value, scale)});
+  for (const Value& knot : block.rows("knots", kKnotHasNoKeys))
+    parameters.push_back(
+        {"k(" + knot.at("phi_deg").text() + ")", knot.at("value").number() * scale, read_uncertainty(knot, scale)});
   return parameters;
 }
 
@@ -313,6 +342,22 @@ void read_provenance(const Value& map, Coefficients::Provenance& into) {
     into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
 }
 
+/// How k changes with the speed, and φ the torque.
+void read_more_of_curve(const Value& top, const std::vector<Coefficients::Torque>& torque, ThrustCurve& curve) {
+  if (top.find("speed_trend")) {
+    const Value trend = top.map_at("speed_trend");
+    const double share = trend.at("share_per_1000_rpm").number() / from_rpm(1000).value();
+    if (!curve.set_speed_trend({share, from_rpm(trend.at("reference_rpm").number())}))
+      trend.refuse("k changes by more than 0.3 from rest to the reference speed, or that is not positive", kFitAgain);
+  }
+  if (torque.size() < 2 || torque.size() > kMostKnots) return;
+  std::vector<Knot> shares;
+  for (const Coefficients::Torque& one : torque) shares.push_back({one.occlusion, one.k_q / torque.front().k_q});
+  const auto table = OcclusionTable::from(shares.data(), shares.size());
+  if (!table || !curve.set_torque_share(*table))
+    top.at("torque").refuse("the torques do not ascend from phi_deg 0, or one is ten times the first", kFitAgain);
+}
+
 /// K_T is the k of the table at φ = 0, to the rounding of a hand that wrote it.
 void refuse_other_k_t(const Value& top, const Coefficients& coefficients) {
   constexpr double kRounding = 1e-3;
@@ -351,6 +396,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   if (top.find("torque"))
     for (const Value& row : top.rows("torque", "a row of the torques has no keys"))
       coefficients.torque.push_back(read_torque(row));
+  read_more_of_curve(top, coefficients.torque, coefficients.curve);
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
   coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
@@ -378,12 +424,22 @@ Coefficients load_coefficients(const std::string& path) {
 }
 
 std::string words_of(const ThrustCurve& curve) {
-  return curve.visit([](const Line& line) {
-    char words[64];
-    std::snprintf(words, sizeof words, "%.6g %c %.6g phi/rad", line.intercept.value(),
-                  line.slope_per_rad < 0 ? '-' : '+', std::fabs(line.slope_per_rad));
-    return std::string(words);
-  });
+  char words[64];
+  return curve.visit(
+      [&](const Line& line) {
+        std::snprintf(words, sizeof words, "%.6g %c %.6g phi/rad", line.intercept.value(),
+                      line.slope_per_rad < 0 ? '-' : '+', std::fabs(line.slope_per_rad));
+        return std::string(words);
+      },
+      [&](const OcclusionTable& table) {
+        std::string text;
+        for (const Knot& knot : table) {
+          std::snprintf(words, sizeof words, "%s%.6g at %.4g", text.empty() ? "" : ", ", knot.value,
+                        to_degrees(knot.occlusion));
+          text += words;
+        }
+        return text + " deg";
+      });
 }
 
 std::optional<std::string> overlap_mismatch(OverlapMeasure fitted, const std::string& coefficients,

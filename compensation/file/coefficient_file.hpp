@@ -103,7 +103,7 @@ struct Coefficients {
 /// As load_coefficients, from text; `path` only names it in messages.
 [[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path);
 
-/// k(φ) in N/(rad/s)² for people: "1.59668e-06 - 2.5658e-07 phi/rad".
+/// k(φ) in N/(rad/s)² for people: "1.59668e-06 - 2.5658e-07 phi/rad", "1.55e-06 at 0, 1.39e-06 at 45 deg".
 [[nodiscard]] std::string words_of(const ThrustCurve& curve);
 
 /// A message for coefficients and a vehicle that measure φ differently, naming both files; nullopt if they agree.

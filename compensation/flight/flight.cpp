@@ -81,7 +81,7 @@ struct Flight {
   }
 
   static Pilot pilot_for(const Scene& scene) {
-    const auto pilot = Pilot::build(scene.vehicle, scene.curve, scene.pilot);
+    const auto pilot = Pilot::build(scene.vehicle, scene.curves, scene.pilot);
     if (!pilot) throw std::invalid_argument("no controller can be built for this vehicle; check its sizes and spins");
     return *pilot;
   }

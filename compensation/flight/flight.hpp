@@ -92,7 +92,8 @@ class Estimator {
 /// All that one flight depends on.
 struct Scene {
   Vehicle vehicle;
-  compensation::ThrustCurve curve;  ///< of the coefficient file; its K_T is that of a rotor without error
+  /// Of the coefficient files; their K_T are those of rotors without error.
+  compensation::Rotors<compensation::ThrustCurve> curves;
   Truth truth;
   EstimatorNoise noise;
   PilotSettings pilot;

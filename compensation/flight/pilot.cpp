@@ -79,9 +79,9 @@ void RateControl::applied(const Eigen::Vector3d& torque, double width) noexcept 
   rotor_torque_ += (1 - std::exp(-width / lag_)) * (torque - rotor_torque_);
 }
 
-std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::ThrustCurve& curve,
+std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::Rotors<compensation::ThrustCurve>& curves,
                                   const PilotSettings& settings) {
-  const auto built = Compensator::build({curve, curve, curve, curve}, vehicle.airframe);
+  const auto built = Compensator::build(curves, vehicle.airframe);
   const auto mixer =
       Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x, {})), {Metres(vehicle.build.yaw_arm_m), 0.0});
   if (!built.compensator || !mixer) return std::nullopt;

@@ -85,7 +85,8 @@ struct PilotSettings {
 class Pilot {
  public:
   /// Nothing if the compensator refuses the vehicle, or the mixer its rotors in X or in O.
-  [[nodiscard]] static std::optional<Pilot> build(const Vehicle& vehicle, const compensation::ThrustCurve& curve,
+  [[nodiscard]] static std::optional<Pilot> build(const Vehicle& vehicle,
+                                                  const compensation::Rotors<compensation::ThrustCurve>& curves,
                                                   const PilotSettings& settings);
 
   void compensate(bool on) noexcept;

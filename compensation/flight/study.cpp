@@ -21,12 +21,14 @@ void count_lost(Merits& merits, const Experiment& experiment, const FlightResult
   (plain ? merits.lost_plain : merits.lost_compensated) = true;
 }
 
-/// The slope first, then the start: the order of the draws.
-ThrustCurve drawn_curve(const ThrustCurve& curve, Random& random) {
-  const double steepness = random.normal(1.0, 0.03);
-  const auto drawn = curve.perturbed(random.normal(0.0, 0.01) * curve.thrust_coefficient(), steepness);
-  if (!drawn) throw std::invalid_argument("k(0) is not positive in a draw; check the coefficient file");
-  return *drawn;
+/// The slope first, then the start: the order of the draws. All rotors alike: the bench is off, not a propeller.
+void draw_curves(compensation::Rotors<ThrustCurve>& curves, Random& random) {
+  const double steepness = random.normal(1.0, 0.03), raised = random.normal(0.0, 0.01);
+  for (ThrustCurve& curve : curves) {
+    const auto drawn = curve.perturbed(raised * curve.thrust_coefficient(), steepness);
+    if (!drawn) throw std::invalid_argument("k(0) is not positive in a draw; check the coefficient file");
+    curve = *drawn;
+  }
 }
 
 /// The arms that stop short of the farthest one do so `factor` times as far.
@@ -65,9 +67,9 @@ Truth assumed_world(const Vehicle& vehicle) {
   return world;
 }
 
-Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const ThrustCurve& curve, const Truth& world,
-                    std::uint64_t seed) {
-  return {vehicle, curve, world, {}, pilot, seed};
+Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot, const compensation::Rotors<ThrustCurve>& curves,
+                    const Truth& world, std::uint64_t seed) {
+  return {vehicle, curves, world, {}, pilot, seed};
 }
 
 Scene drawn_scene(const Scene& nominal, std::size_t index) {
@@ -78,7 +80,7 @@ Scene drawn_scene(const Scene& nominal, std::size_t index) {
   draw_truth(scene.truth, random);
   draw_gains(scene.pilot.gains, random);
   scene.vehicle.o = with_margin(nominal.vehicle.o, random.uniform(0.4, 2.0));
-  scene.curve = drawn_curve(nominal.curve, random);
+  draw_curves(scene.curves, random);
   return scene;
 }
 

@@ -16,7 +16,8 @@ namespace kphi::flight {
 
 /// The one set of circumstances that single flights use. `seed` is of the estimator's noise.
 [[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot,
-                                  const compensation::ThrustCurve& curve, const Truth& world, std::uint64_t seed);
+                                  const compensation::Rotors<compensation::ThrustCurve>& curves, const Truth& world,
+                                  std::uint64_t seed);
 
 /// Draw `index` of the seed of `nominal`, whatever was drawn before: the three loss laws in turn, and about the nominal
 /// world γ from 0.4 less to 0.1 more, mass 1.5 %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5 mm per

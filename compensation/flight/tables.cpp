@@ -147,7 +147,7 @@ std::string draws_csv(const std::vector<Draw>& draws) {
   for (std::size_t i = 0; i < draws.size(); ++i) {
     const Truth& truth = draws[i].scene.truth;
     const Gains& gains = draws[i].scene.pilot.gains;
-    const compensation::ThrustCurve& curve = draws[i].scene.curve;
+    const compensation::ThrustCurve& curve = draws[i].scene.curves[0];
     const double k_t = curve.thrust_coefficient().value(), start = curve.at(Radians(0)).value();
     const double rise = curve.at(curve.largest_fitted()).value() - start;
     const Merits merits = merits_of(draws[i].flights);

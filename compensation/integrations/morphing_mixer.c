@@ -4,7 +4,7 @@
 
 const char *morphingInit(morphingState_t *state, const morphingVehicle_t *vehicle, const float *armAngles) {
   const int refusal =
-      kphi_compensator_build(&state->compensator, vehicle->lines, &vehicle->airframe, KPHI_LAW_CLAMPED);
+      kphi_compensator_build(&state->compensator, vehicle->curves, &vehicle->airframe, KPHI_LAW_CLAMPED);
   if (refusal != 0) return kphi_refusal_text(refusal);
   state->vehicle = vehicle;
   state->rotors = vehicle->airframe.rotors != 0 ? vehicle->airframe.rotors : 4;

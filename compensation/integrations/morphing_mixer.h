@@ -11,7 +11,7 @@
 typedef struct morphingVehicle_s {
   kphi_airframe airframe;
   kphi_masses masses;
-  kphi_line lines[KPHI_MAX_ROTORS];
+  kphi_curve curves[KPHI_MAX_ROTORS];
   int spins[KPHI_MAX_ROTORS];  // +1 where the drag torque points up
   float dragPerNewton;         // N m/N
   float fullThrust;            // N, of an uncovered rotor at throttle 1

@@ -91,9 +91,25 @@ std::string curve_block(const Fitted& fitted) {
   std::string text = "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
                      fmt::format("curve:\n  form: {}\n  anchored: {}\n  points_deg: {}\n", name_of(fit.form),
                                  fit.anchored, list(points));
-  for (std::size_t i = 0; i < fit.parameters.size(); ++i)
-    text += "  " + fit.parameters[i].key + ": " + entry_of(fitted.analysis.parameters[i], "", fit.parameters[i].per);
+  bool knots = false;
+  for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+    const CurveParameter& one = fit.parameters[i];
+    const Budget& budget = fitted.analysis.parameters[i];
+    if (one.at_deg && !std::exchange(knots, true)) text += "  knots:\n";
+    text += one.at_deg ? "    - " + entry_of(budget, ", phi_deg: " + yaml_number(*one.at_deg), "")
+                       : "  " + one.key + ": " + entry_of(budget, "", one.per);
+  }
   return text;
+}
+
+/// Of k with the speed, in shares per 1000 RPM.
+std::string trend_block(const Analysis& analysis) {
+  if (!analysis.trend) return {};
+  const double per_krpm = RadPerSec(from_rpm(1000)).value();
+  const auto& [change, reference] = *analysis.trend;
+  return fmt::format("speed_trend: {{share_per_1000_rpm: {}, u: {}, reference_rpm: {}}}\n",
+                     yaml_number(change.value * per_krpm), yaml_number(change.u * per_krpm),
+                     yaml_number(printed_rpm(reference)));
 }
 
 std::string valid_block(const Identification& identification) {
@@ -213,8 +229,8 @@ Enum named(const std::string& name, const char* key, const std::string& path, co
 
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
-  const char* const form = name_of(identification.options.curve.form);
-  if (!from_steps) return fmt::format("a weighted {} through given k(phi)", form);
+  const char* const form = identification.options.curve.form == CurveForm::table ? "table" : "weighted line";
+  if (!from_steps) return fmt::format("a {} through given k(phi)", form);
   constexpr std::array<const char*, 4> words{
       "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
       "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
@@ -223,12 +239,13 @@ std::string estimator_words(const Identification& identification) {
     text += fmt::format(", weighted by {}",
                         identification.options.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
   if (identification.options.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.options.loss));
-  return text + fmt::format(", then a weighted {} through k(phi)", form);
+  return text + fmt::format(", then a {} through k(phi)", form);
 }
 
 std::string format_coefficients(const Fitted& fitted, const Provenance& provenance) {
   const Identification& identification = fitted.identification;
-  std::string text = head(identification, provenance) + curve_block(fitted) + valid_block(identification) + "table:\n";
+  std::string text = head(identification, provenance) + curve_block(fitted) + trend_block(fitted.analysis) +
+                     valid_block(identification) + "table:\n";
   for (std::size_t i = 0; i < identification.table.size(); ++i) text += table_row(fitted, i);
   text += provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
   (void)compensation::parse_coefficients(text, "coefficients.yaml");  // what cannot be read again is not written

@@ -187,6 +187,20 @@ constexpr const char* kHeaderLine = R"(
 constexpr double coefficient_at(double phi) { return kIntercept + kSlope * phi; }
 )";
 
+constexpr const char* kHeaderTable = R"(
+constexpr int kKnots = {0};
+constexpr double kKnotPhi[kKnots] = {{{1}}};  ///< rad
+constexpr double kKnotCoefficient[kKnots] = {{{2}}};  ///< N/(rad/s)^2
+
+/// k, N/(rad/s)^2, straight between the knots; phi in rad. Beyond kLargestPhi it is an extrapolation.
+constexpr double coefficient_at(double phi, int i = 0) {{
+  return i + 2 < kKnots && phi >= kKnotPhi[i + 1]
+             ? coefficient_at(phi, i + 1)
+             : kKnotCoefficient[i] + (kKnotCoefficient[i + 1] - kKnotCoefficient[i]) /
+                                         (kKnotPhi[i + 1] - kKnotPhi[i]) * (phi - kKnotPhi[i]);
+}}
+)";
+
 constexpr const char* kHeaderFunctions = R"(
 /// k_i in [0.1, 1]: 1 without occlusion (and for a NaN), never a slower propeller, never a diverging one.
 constexpr double scaling_factor(double phi) {
@@ -201,6 +215,14 @@ constexpr double squared_speed(double thrust, double phi) {
   return thrust / (kThrustCoefficient * scaling_factor(phi));
 }
 )";
+
+/// Nothing if k does not change with the speed.
+void say_trend(const compensation::Coefficients& file, Export& result) {
+  const auto& [per_rad_s, reference] = file.curve.speed_trend();
+  if (per_rad_s == 0) return;
+  result.lost.push_back(fmt::format("change of k with the speed: {:+.2g} % each 1000 RPM; k is that of {:.0f} RPM",
+                                    100 * per_rad_s * from_rpm(1000).value(), to_rpm(reference)));
+}
 
 std::string error_at(const compensation::ThrustCurve& curve, Radians phi) {
   const double error = curve.standard_error_at(phi);
@@ -253,6 +275,7 @@ Export to_agilicious(const compensation::Coefficients& file, const ExportOptions
   result.lost = {no_phi("thrust_map", options.phi_deg),
                  "uncertainties, air density: the file has no keys for them; see its comments"};
   if (!kappa) result.lost.emplace_back(kNoTorque);
+  say_trend(file, result);
   return result;
 }
 
@@ -293,6 +316,7 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
         fmt::format("CA_ROTORn_KM: {}, negative for a rotor that turns clockwise; name the "
                     "directions with --turns ccw,ccw,cw,cw to have it written",
                     words_of(*moment)));
+  say_trend(file, result);
   return result;
 }
 
@@ -331,6 +355,7 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
   if (!moment) result.lost.emplace_back(kNoTorque);
   if (options.turns.empty())
     result.lost.emplace_back("turning directions: the plugin's default; name them with --turns ccw,ccw,cw,cw");
+  say_trend(file, result);
   return result;
 }
 
@@ -344,12 +369,23 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   parameters.number("thrust_coefficient_u_n_s2_per_rad2", K_T ? std::optional(K_T->u) : std::nullopt);
   parameters.number("thrust_coefficient_expanded_95_n_s2_per_rad2",
                     K_T ? std::optional(K_T->expanded_95) : std::nullopt);
-  file.curve.visit([&](const compensation::Line& line) {
-    parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
-    parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
-    if (const auto& u = line.uncertainty)
-      parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
-  });
+  file.curve.visit(
+      [&](const compensation::Line& line) {
+        parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
+        parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
+        if (const auto& u = line.uncertainty)
+          parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
+      },
+      [&](const compensation::OcclusionTable& table) {
+        std::vector<double> phi, k;
+        for (const compensation::Knot& knot : table) phi.push_back(knot.occlusion.value()), k.push_back(knot.value);
+        parameters.list("curve_phi_rad", phi);
+        parameters.list("curve_k_n_s2_per_rad2", k);
+      });
+  if (const auto& trend = file.curve.speed_trend(); trend.per_rad_s != 0) {
+    parameters.number("speed_trend_s_per_rad", trend.per_rad_s);
+    parameters.number("speed_trend_reference_rad_s", trend.reference.value());
+  }
   parameters.number("phi_max_rad", file.curve.largest_fitted().value());
   parameters.number("speed_min_rad_s", value_of(file.slowest_speed));
   parameters.number("speed_max_rad_s", value_of(file.fastest_speed));
@@ -378,16 +414,26 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
     constant("kThrustCoefficientExpanded95", file.thrust_coefficient->expanded_95, "half of its 95 % interval (GUM)");
   constant("kLargestPhi", file.curve.largest_fitted().value(), "rad, the largest occlusion measured");
   if (file.fastest_speed) constant("kFastestSpeed", file.fastest_speed->value(), "rad/s, the fastest measured");
-  file.curve.visit([&](const compensation::Line& line) {
-    constant("kIntercept", line.intercept.value(), "of the line, N/(rad/s)^2");
-    constant("kSlope", line.slope_per_rad, "of the line, N/(rad/s)^2 per rad");
-    result.text += kHeaderLine;
-  });
+  file.curve.visit(
+      [&](const compensation::Line& line) {
+        constant("kIntercept", line.intercept.value(), "of the line, N/(rad/s)^2");
+        constant("kSlope", line.slope_per_rad, "of the line, N/(rad/s)^2 per rad");
+        result.text += kHeaderLine;
+      },
+      [&](const compensation::OcclusionTable& table) {
+        std::vector<std::string> phi, k;
+        for (const compensation::Knot& knot : table) {
+          phi.push_back(yaml_number(knot.occlusion.value()));
+          k.push_back(yaml_number(knot.value));
+        }
+        result.text += fmt::format(kHeaderTable, phi.size(), fmt::join(phi, ", "), fmt::join(k, ", "));
+      });
   result.text += kHeaderFunctions;
   result.text += fmt::format("\n}}  // namespace {}\n", identifier(file.propeller.id));
   result.lost = {
       "the measured k per occlusion, covariance, hashes of the runs: the header is for the flight, which only needs "
       "k(phi)"};
+  say_trend(file, result);
   return result;
 }
 

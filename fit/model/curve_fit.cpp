@@ -20,6 +20,8 @@ const CurveModel& model_of(CurveForm form) {
   switch (form) {
     case CurveForm::line:
       return line_model();
+    case CurveForm::table:
+      return table_model();
   }
   throw std::logic_error("no such form of k(phi)");
 }
@@ -61,6 +63,9 @@ std::vector<CurvePoint> carriers(const std::vector<CurvePoint>& points, const Cu
         fmt::format("{0} fit: {1} points for the {0}, but it needs {2} with phi > 0; measure more occlusions{3}", form,
                     used.size(), needed, options.anchored ? "" : fmt::format(" or anchor the {} at K_T", form)));
   }
+  if (const std::size_t most = model_of(options.form).most_points(); static_cast<std::size_t>(occluded) > most)
+    throw FitError(fmt::format("{0} fit: {1} occlusions, but a {0} holds {2} beside phi = 0; choose them with --points",
+                               form, occluded, most));
   return used;
 }
 
@@ -131,7 +136,8 @@ CurveFit fit_curve(std::span<const CurvePoint> points, const CurveOptions& optio
     throw FitError(
         fmt::format("{} fit: no run at phi = 0; K_T is measured without an occlusion on the same stand", form));
 
-  CurveFit fit{.form = options.form, .anchored = options.anchored, .K_T = all.front().k};
+  const bool anchored = model_of(options.form).anchored(options.anchored);
+  CurveFit fit{.form = options.form, .anchored = anchored, .K_T = all.front().k};
   const double floor = kErrorFloor * largest_k(all, form);
   const auto known_error = [&](const CurvePoint& point) {
     return point.standard_error > 0 ? point.standard_error : floor;

@@ -1,6 +1,6 @@
 // The curve k(φ) through the coefficients of the occlusions (paper, "Results of the Identification": the orange line).
-// Its forms have files of their own (line.cpp). What comes after the fit asks for k, weights and parameters and does
-// not know the form.
+// Its forms have files of their own (line.cpp, table.cpp). What comes after the fit asks for k, weights and parameters
+// and does not know the form.
 #pragma once
 
 #include <array>
@@ -24,10 +24,10 @@ struct CurvePoint {
 
 /// Forms of k(φ). Each has its CurveModel in a file of its own; model_of() in curve_fit.cpp does not compile without
 /// it.
-enum class CurveForm : std::uint8_t { line };
-inline constexpr std::array kCurveForms{CurveForm::line};
+enum class CurveForm : std::uint8_t { line, table };
+inline constexpr std::array kCurveForms{CurveForm::line, CurveForm::table};
 
-/// In coefficients.yaml and for people: "line".
+/// In coefficients.yaml and for people: "line", "table".
 [[nodiscard]] const char* name_of(CurveForm form);
 
 struct Curvature {
@@ -57,6 +57,7 @@ struct CurveParameter {
   double value = 0;
   /// The value is Σ weight · k over all the points given to the fit, ascending φ, with the weights of the fit.
   std::vector<double> weights{};
+  std::optional<double> at_deg{};  ///< of a k in a table: its φ
 };
 
 class CurveModel;
@@ -105,8 +106,12 @@ class CurveModel {
  public:
   virtual ~CurveModel() = default;
   [[nodiscard]] virtual const char* name() const = 0;
+  /// Whether k(0) is K_T, which was `asked` for.
+  [[nodiscard]] virtual bool anchored(bool asked) const { return asked; }
   /// How many points it needs; with fewer the fit is refused.
   [[nodiscard]] virtual std::size_t least_points(bool anchored) const = 0;
+  /// How many it can hold.
+  [[nodiscard]] virtual std::size_t most_points() const { return std::numeric_limits<std::size_t>::max(); }
   /// Of a fit with points and sigmas; `all` are those given to the fit, ascending φ.
   [[nodiscard]] virtual std::vector<CurveParameter> parameters(const CurveFit& fit,
                                                                std::span<const CurvePoint> all) const = 0;
@@ -124,6 +129,8 @@ class CurveModel {
   [[nodiscard]] virtual bool may_miss(const CurveFit& fit, double phi_deg) const = 0;
   /// What a pilot reads when the test falls: "k(φ) is not a line".
   [[nodiscard]] virtual const char* denial() const = 0;
+  /// What else may be done about it: "; if they are right, fit a table (--form table)"; or nothing.
+  [[nodiscard]] virtual const char* remedy() const { return ""; }
   /// "line, free": for people.
   [[nodiscard]] virtual std::string words(const CurveFit& fit) const = 0;
   /// What a pilot should know of the form: k(0) beside K_T, clipping, zero. `mismatch` is that of k(0) with its error,
@@ -139,6 +146,7 @@ class CurveModel {
 inline constexpr double kSameAngleDeg = 1e-6;
 
 [[nodiscard]] const CurveModel& line_model();
+[[nodiscard]] const CurveModel& table_model();
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ
 /// is listed twice or not measured, or too few points remain for the form.

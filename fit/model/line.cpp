@@ -56,6 +56,7 @@ class LineModel final : public CurveModel {
  public:
   const char* name() const override { return "line"; }
   const char* denial() const override { return "k(φ) is not a line"; }
+  const char* remedy() const override { return "; if they are right, fit a table (--form table)"; }
   std::size_t least_points(bool anchored) const override { return anchored ? 1 : 2; }
   std::size_t terms(const CurveFit& line) const override { return line.anchored ? 1 : 2; }
   bool may_miss(const CurveFit& line, double phi_deg) const override { return phi_deg > 0 || !line.anchored; }

@@ -138,10 +138,17 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
                      {"u", budget.combined()},
                      {"expanded_95", budget.expanded()}});
   }
-  for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    curve[fit.parameters[i].key] = {{"value", analysis.parameters[i].value},
-                                    {"u", analysis.parameters[i].combined()},
-                                    {"expanded_95", analysis.parameters[i].expanded()}};
+  for (std::size_t i = 0; i < analysis.parameters.size(); ++i) {
+    const CurveParameter& one = fit.parameters[i];
+    Json number{{"value", analysis.parameters[i].value},
+                {"u", analysis.parameters[i].combined()},
+                {"expanded_95", analysis.parameters[i].expanded()}};
+    if (one.at_deg) number["phi_deg"] = *one.at_deg;
+    if (one.at_deg)
+      curve["knots"].push_back(std::move(number));
+    else
+      curve[one.key] = std::move(number);
+  }
   Json doubts = Json::array();
   for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(doubt.text);
   return {{"coefficients", coefficients.empty() ? Json() : Json(coefficients.string())},
@@ -181,8 +188,9 @@ std::string headline_text(const Fitted& fitted) {
   for (const Doubt& doubt : analysis.flight.doubts) text += fmt::format("{:<10} {}\n", "", doubt.text);
   text += number_line("K_T", K_T);
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
-                        identification.curve_fit.parameters[i].per);
+    if (identification.curve_fit.parameters[i].at_deg != 0.0)  // K_T once more
+      text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
+                          identification.curve_fit.parameters[i].per);
   if (!analysis.standard.empty()) text += number_line("k_standard", analysis.standard.front());
   return text + plus_minus_words(analysis.standard.empty() ? K_T : analysis.standard.front()) + "\n";
 }

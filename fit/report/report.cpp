@@ -52,8 +52,9 @@ std::string headline(const Fitted& fitted) {
   const Budget& K_T = analysis.coefficients.front();
   std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0), measured without occlusion", K_T, "");
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
-    cards += card(fmt::format("k(φ), {}: {}", name_of(curve.form), analysis.parameters[i].quantity),
-                  analysis.parameters[i], curve.parameters[i].per);
+    if (curve.parameters[i].at_deg != 0.0)  // K_T once more
+      cards += card(fmt::format("k(φ), {}: {}", name_of(curve.form), analysis.parameters[i].quantity),
+                    analysis.parameters[i], curve.parameters[i].per);
   return "<div class=\"cards\">\n" + cards + "</div>\n" + html_note(typeset(plus_minus_words(K_T)) + ".");
 }
 

@@ -107,6 +107,16 @@ Budget budget_of(const CurveParameter& parameter, const ErrorSources& sources, c
   return budget;
 }
 
+/// How far k(φ) may bend away between two angles of a table.
+BudgetRow between_knots(const compensation::ThrustCurve& curve, double phi_deg, double scale = 1) {
+  return {.source = "bend between the angles",
+          .evaluation = Evaluation::type_b,
+          .u = curve.bend_error_at(from_degrees(phi_deg)),
+          .unit = kUnitOfK,
+          .sensitivity = scale,
+          .note = "by the change of slope at its neighbours"};
+}
+
 CurvePrediction predict(const Identification& identification, const ErrorSources& sources, double phi_deg,
                         const Misfit& misfit) {
   const double K_T = identification.thrust_coefficient().value;
@@ -119,6 +129,7 @@ CurvePrediction predict(const Identification& identification, const ErrorSources
       sources.budget(fmt::format("{} at {} deg", name_of(identification.curve_fit.form), phi_deg), kUnitOfK, k, at);
   const bool beside = identification.curve_fit.model().may_miss(identification.curve_fit, phi_deg);
   prediction.k.rows.push_back(misfit.of(at, beside));
+  prediction.k.rows.push_back(between_knots(curve, phi_deg));
   prediction.speed_u_share = k > 0 ? 0.5 * prediction.k.combined() / k : std::numeric_limits<double>::infinity();
   std::vector<double> ratio = at;
   for (double& weight : ratio) weight /= K_T;
@@ -127,6 +138,7 @@ CurvePrediction predict(const Identification& identification, const ErrorSources
   prediction.scaling_factor =
       sources.budget(fmt::format("k_i({} deg)", phi_deg), "1", curve.scaling_factor(from_degrees(phi_deg)), ratio);
   prediction.scaling_factor.rows.push_back(misfit.of(at, beside, 1 / K_T));
+  prediction.scaling_factor.rows.push_back(between_knots(curve, phi_deg, 1 / K_T));
   prediction.extrapolated =
       phi_deg < identification.first_fitted_deg() || phi_deg > identification.curve_fit.points.back().phi_deg;
   return prediction;
@@ -140,11 +152,13 @@ std::vector<CurveBand> band_of(const Identification& identification, const Error
   std::set<double> angles;
   for (int i = 0; i <= kPieces; ++i) angles.insert(widest * i / kPieces);
   for (const OcclusionCoefficient& one : identification.table) angles.insert(one.phi_deg);
+  const compensation::ThrustCurve curve = identification.curve();
   std::vector<CurveBand> band;
   for (const double phi : angles) {
     const std::vector<double> at = identification.curve_fit.weights_at(phi);
     Budget k = sources.budget("", kUnitOfK, identification.curve_fit.k_at(phi), at);
     k.rows.push_back(misfit.of(at));
+    k.rows.push_back(between_knots(curve, phi));
     band.push_back({phi, k.value, k.expanded()});
   }
   return band;
@@ -263,6 +277,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   for (const OcclusionCoefficient& row : identification.table) phis.push_back(row.phi_deg);
   const bool from_steps = !identification.repeatability.angles.empty();
   if (from_steps) analysis.speed = speed_dependence(identification.table, identification.repeatability.zero_movement);
+  analysis.trend = speed_trend(identification, analysis.speed);
   const ErrorSources sources = sources_of(identification, analysis, options.bench);
   for (std::size_t i = 0; i < phis.size(); ++i)
     analysis.coefficients.push_back(
@@ -273,8 +288,8 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
   analysis.outlying = outlying_runs(identification.selection.used);
-  analysis.flight =
-      flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences});
+  analysis.flight = flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying,
+                                                      analysis.differences, analysis.trend.has_value()});
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   std::vector<Estimate> k;

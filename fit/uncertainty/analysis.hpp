@@ -12,6 +12,7 @@
 #include "fit/uncertainty/budget.hpp"
 #include "fit/uncertainty/readiness.hpp"
 #include "fit/uncertainty/speed_dependence.hpp"
+#include "fit/uncertainty/speed_trend.hpp"
 
 namespace kphi::fit {
 
@@ -66,6 +67,7 @@ struct Analysis {
   std::vector<Budget> standard;                 ///< k(φ) in standard air, one per row; empty if the air is unknown
   std::vector<std::vector<double>> covariance;  ///< of K_T and the parameters; NaN: unknown
   std::vector<SpeedDependence> speed;           ///< one per φ
+  std::optional<SpeedTrend> trend;              ///< of k with the speed, if there is one
   Curvature curvature;                          ///< of the curve's form
   StraightLine line;
   std::vector<HypothesisTest> differences;  ///< Student tests between neighbouring occlusions

@@ -52,10 +52,12 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
     clearest.p = p;
     const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
     clearest.doubt.text = fmt::format(
-        "k {} with speed, by {} at {}° from {:.0f} to {:.0f} RPM: near {:.0f} RPM the thrust is {} {} than k says; fit "
-        "the speeds of your flight alone (--speed-range-rpm)",
+        "k {} with speed, by {} at {}° from {:.0f} to {:.0f} RPM: near {:.0f} RPM the thrust is {} {} than k says; {}",
         change > 0 ? "rises" : "falls", in_percent(change), one.phi_deg, rpm(one.levels.front()),
-        rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher");
+        rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher",
+        tests.trend_flies ? "the flying library follows it (speed_trend); for a stack that cannot, fit the speeds of "
+                            "your flight alone (--speed-range-rpm)"
+                          : "fit the speeds of your flight alone (--speed-range-rpm)");
   }
   if (count == 0) return std::nullopt;
   clearest.p = std::min(1.0, count * clearest.p);
@@ -79,9 +81,10 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
       {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
        fmt::format(
            "{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
-           "the plates and their angles{}",
+           "the plates and their angles{}{}",
            fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above",
-           runs.mounted_once && !runs.mounting ? " (each was mounted once: a crooked mounting looks the same)" : "")}};
+           runs.mounted_once && !runs.mounting ? " (each was mounted once: a crooked mounting looks the same)" : "",
+           fit.model().remedy())}};
 }
 
 std::optional<Suspicion> of_runs(const ModelTests& tests) {

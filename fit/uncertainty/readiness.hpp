@@ -41,6 +41,7 @@ struct ModelTests {
   const Curvature& curvature;
   std::span<const OutlyingRun> outlying;
   std::span<const HypothesisTest> differences;
+  bool trend_flies = false;  ///< the coefficient file holds how k changes with the speed
 };
 
 [[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests);

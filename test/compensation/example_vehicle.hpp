@@ -42,6 +42,17 @@ inline ThrustCurve paper_line(OverlapMeasure measure = OverlapMeasure::rim_arc) 
   return *paper_line_if(measure, std::nullopt);
 }
 
+/// Bent as no line is, in units of K_T; `error` of every k.
+inline ThrustCurve example_table(double error = kInfinity) {
+  const double k_t = kExampleCoefficient.value();
+  const Knot knots[] = {{Radians(0), k_t, error * k_t},
+                        {from_degrees(45), 0.96 * k_t, error * k_t},
+                        {from_degrees(90), 0.83 * k_t, error * k_t},
+                        {from_degrees(180), 0.40 * k_t, error * k_t},
+                        {from_degrees(270), 0.25 * k_t, error * k_t}};
+  return *ThrustCurve::from_table(*OcclusionTable::from(knots, 5), from_degrees(270));
+}
+
 inline Airframe example_airframe(OverlapMeasure measure = OverlapMeasure::rim_arc) {
   Airframe airframe;
   airframe.half_side = Metres(0.045);

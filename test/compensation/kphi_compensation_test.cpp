@@ -12,9 +12,9 @@
 namespace kphi::compensation {
 namespace kphi_compensation_test {
 
-kphi_line plain_line() {
+kphi_curve plain_line() {
   const ThrustCurve line = paper_line();
-  kphi_line plain{};
+  kphi_curve plain{};
   plain.thrust_coefficient = line.thrust_coefficient().value();
   plain.intercept = line_of(line).intercept.value();
   plain.slope_per_rad = line_of(line).slope_per_rad;
@@ -34,7 +34,7 @@ kphi_airframe plain_airframe() {
 }
 
 kphi_compensator built(const kphi_airframe& airframe, int law = KPHI_LAW_CLAMPED) {
-  const kphi_line lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
+  const kphi_curve lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
   kphi_compensator compensator;
   EXPECT_EQ(kphi_compensator_build(&compensator, lines, &airframe, law), 0);
   return compensator;
@@ -77,11 +77,11 @@ TEST(PlainInterface, GivesTheNumbersOfTheClassBitForBit) {
 }
 
 TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
-  kphi_line line = plain_line();
+  kphi_curve line = plain_line();
   line.has_uncertainty = 1;
   line.thrust_coefficient_error = 0.01 * line.thrust_coefficient;
   line.intercept_variance = 4e-18;
-  const kphi_line lines[4] = {line, line, line, plain_line()};
+  const kphi_curve lines[4] = {line, line, line, plain_line()};
   const kphi_airframe airframe = plain_airframe();
   kphi_compensator compensator;
   ASSERT_EQ(kphi_compensator_build(&compensator, lines, &airframe, KPHI_LAW_CLAMPED), 0);
@@ -93,6 +93,40 @@ TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
   EXPECT_NEAR(uncertainties[0] / speeds[0], 0.005, 1e-12);
   EXPECT_NEAR(uncertainties[1] / speeds[1], 0.5 * 2e-9 * speeds[1] * speeds[1], 1e-12) << "of k = 1 N over speed²";
   EXPECT_EQ(uncertainties[3], kInfinity);
+}
+
+TEST(PlainInterface, TakesATableATrendAndATorqueAsTheClassDoes) {
+  ThrustCurve curve = example_table(0.01);
+  const Knot shares[] = {{Radians(0), 1}, {from_degrees(90), 0.8}};
+  ASSERT_TRUE(curve.set_torque_share(*OcclusionTable::from(shares, 2)));
+  ASSERT_TRUE(curve.set_speed_trend({5e-5, RadPerSec(1500)}));
+  kphi_curve plain{};
+  plain.largest_fitted_rad = curve.largest_fitted().value();
+  curve.visit([](const Line&) { FAIL() << "it is a table"; },
+              [&](const OcclusionTable& table) {
+                for (const Knot& knot : table)
+                  plain.knots[plain.knot_count++] = {knot.occlusion.value(), knot.value, knot.standard_error};
+              });
+  plain.torque_count = 2;
+  for (int i = 0; i < 2; ++i) plain.torque[i] = {shares[i].occlusion.value(), shares[i].value, 0};
+  plain.trend_per_rad_s = 5e-5;
+  plain.trend_reference = 1500;
+  const kphi_curve curves[4] = {plain, plain, plain, plain};
+  const kphi_airframe airframe = plain_airframe();
+  kphi_compensator compensator;
+  ASSERT_EQ(kphi_compensator_build(&compensator, curves, &airframe, KPHI_LAW_CLAMPED), 0);
+  EXPECT_EQ(kphi_curve_doubts(&plain, KPHI_LAW_CLAMPED), 0);
+  Compensator typed = build_with(curve).compensator.value();
+  const double o[4] = {kPi, 2.9, 2.8, kPi}, thrusts[4] = {1, 2, 3, 4};
+  kphi_set_arms(&compensator, o);
+  typed.set_arms({Radians(o[0]), Radians(o[1]), Radians(o[2]), Radians(o[3])});
+  double got[4];
+  kphi_speeds_for(&compensator, thrusts, got, nullptr);
+  expect_same(got, typed.speeds_for(thrusts_of(1, 2, 3, 4)).speeds);
+  kphi_speed_uncertainties(&compensator, thrusts, 0.01, got);
+  expect_same(got, typed.speed_uncertainties(thrusts_of(1, 2, 3, 4), Radians(0.01)));
+  kphi_drag_scale(&compensator, got);
+  for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(got[j], typed.drag_scale()[j]);
 }
 
 TEST(PlainInterface, TakesAPolygonBody) {
@@ -115,9 +149,9 @@ TEST(PlainInterface, TakesAPolygonBody) {
 }
 
 TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
-  const auto expect = [](const std::string& words, void (*spoil)(kphi_line&, kphi_airframe&),
+  const auto expect = [](const std::string& words, void (*spoil)(kphi_curve&, kphi_airframe&),
                          int law = KPHI_LAW_CLAMPED) {
-    kphi_line lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
+    kphi_curve lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
     kphi_airframe airframe = plain_airframe();
     spoil(lines[2], airframe);
     kphi_compensator compensator;
@@ -128,15 +162,25 @@ TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
     EXPECT_NE(code, 0);
     EXPECT_NE(std::string(kphi_refusal_text(code)).find(words), std::string::npos) << words;
   };
-  expect("K_T", [](kphi_line& line, kphi_airframe&) { line.thrust_coefficient = 0; });
-  expect("overlap measure", [](kphi_line& line, kphi_airframe&) { line.overlap = KPHI_AREA_SHARE; });
-  expect("line", [](kphi_line& line, kphi_airframe&) { line.overlap = 3; });
-  expect("overlap", [](kphi_line&, kphi_airframe& a) { a.overlap = -1; });
-  expect("corners", [](kphi_line&, kphi_airframe& a) { a.corner_count = 13; });
-  expect("corners", [](kphi_line&, kphi_airframe& a) { a.corner_count = -1; });
-  expect("arm", [](kphi_line&, kphi_airframe& a) { a.arm_length = 0.05; });
+  expect("K_T", [](kphi_curve& line, kphi_airframe&) { line.thrust_coefficient = 0; });
+  expect("overlap measure", [](kphi_curve& line, kphi_airframe&) { line.overlap = KPHI_AREA_SHARE; });
+  expect("curve", [](kphi_curve& line, kphi_airframe&) { line.overlap = 3; });
+  for (const int count : {-1, 1, 13}) {
+    kphi_curve odd = plain_line();
+    odd.knot_count = count;
+    EXPECT_EQ(kphi_curve_doubts(&odd, KPHI_LAW_CLAMPED), -1) << count;
+    odd.knot_count = 0;
+    odd.torque_count = count;
+    EXPECT_EQ(kphi_curve_doubts(&odd, KPHI_LAW_CLAMPED), -1) << count;
+  }
+  expect("speed trend", [](kphi_curve& line, kphi_airframe&) { line.trend_per_rad_s = 1e-4; });
+  expect("speed trend", [](kphi_curve& line, kphi_airframe&) { line.trend_per_rad_s = kNaN; });
+  expect("overlap", [](kphi_curve&, kphi_airframe& a) { a.overlap = -1; });
+  expect("corners", [](kphi_curve&, kphi_airframe& a) { a.corner_count = 13; });
+  expect("corners", [](kphi_curve&, kphi_airframe& a) { a.corner_count = -1; });
+  expect("arm", [](kphi_curve&, kphi_airframe& a) { a.arm_length = 0.05; });
   expect(
-      "law", [](kphi_line&, kphi_airframe&) {}, 2);
+      "law", [](kphi_curve&, kphi_airframe&) {}, 2);
   EXPECT_STREQ(kphi_refusal_text(-1), "unknown refusal");
 }
 
@@ -189,13 +233,13 @@ TEST(PlainInterface, KnowsHubsThrottleDoubtsMovingArmsAndItsVersion) {
   EXPECT_NEAR(numbers[0], 1 / factors[0], 1e-12);
   EXPECT_NEAR(kphi_throttle(4, 1, 1), 0.5, 1e-15);
 
-  kphi_line line = plain_line();
-  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), 0);
-  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_PUBLISHED), KPHI_STEPS_AT_CONTACT);
+  kphi_curve line = plain_line();
+  EXPECT_EQ(kphi_curve_doubts(&line, KPHI_LAW_CLAMPED), 0);
+  EXPECT_EQ(kphi_curve_doubts(&line, KPHI_LAW_PUBLISHED), KPHI_STEPS_AT_CONTACT);
   line.slope_per_rad = 1e-7;
-  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), KPHI_GAINS_WITH_OCCLUSION);
+  EXPECT_EQ(kphi_curve_doubts(&line, KPHI_LAW_CLAMPED), KPHI_GAINS_WITH_OCCLUSION);
   line.intercept = 0;
-  EXPECT_EQ(kphi_line_doubts(&line, KPHI_LAW_CLAMPED), -1);
+  EXPECT_EQ(kphi_curve_doubts(&line, KPHI_LAW_CLAMPED), -1);
   EXPECT_STREQ(kphi_compensation_version(), KPHI_COMPENSATION_VERSION);
   EXPECT_EQ(std::string(KPHI_COMPENSATION_VERSION), std::to_string(KPHI_COMPENSATION_VERSION_MAJOR) + "." +
                                                         std::to_string(KPHI_COMPENSATION_VERSION_MINOR) + "." +

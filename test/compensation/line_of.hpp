@@ -6,7 +6,7 @@
 namespace kphi::compensation {
 
 inline Line line_of(const ThrustCurve& curve) {
-  return curve.visit([](const Line& line) { return line; });
+  return curve.visit([](const Line& line) { return line; }, [](const OcclusionTable&) { return Line{}; });
 }
 
 }  // namespace kphi::compensation

@@ -165,6 +165,111 @@ TEST(ThrustCurve, StandardErrorIsThatOfTheLineAndInfiniteIfUnknown) {
   EXPECT_EQ(paper_line().standard_error_at(Radians(1)), kInfinity);
 }
 
+TEST(ThrustCurveOfATable, GivesTheMeasuredKAndStraightBetween) {
+  const ThrustCurve curve = example_table();
+  const double k_t = kExampleCoefficient.value();
+  EXPECT_EQ(curve.thrust_coefficient(), kExampleCoefficient);
+  EXPECT_NEAR(factor(curve, 45, ScalingLaw::clamped), 0.96, 1e-12);
+  EXPECT_NEAR(factor(curve, 90, ScalingLaw::clamped), 0.83, 1e-12);
+  EXPECT_NEAR(factor(curve, 135, ScalingLaw::published), 0.615, 1e-12);
+  EXPECT_EQ(factor(curve, 0, ScalingLaw::clamped), 1);
+  EXPECT_NEAR(factor(curve, 350, ScalingLaw::clamped), 0.4 - 0.15 * 170 / 90, 1e-12) << "as between the last two";
+  EXPECT_NEAR(curve.at(from_degrees(220)).value() / k_t, 0.4 - 0.15 * 40 / 90, 1e-12);
+  EXPECT_EQ(to_degrees(curve.largest_fitted()), 270);
+}
+
+TEST(ThrustCurveOfATable, CannotRiseNorStartBelowZero) {
+  const auto refused = [](double first, double second) {
+    const Knot knots[] = {{Radians(0), first, 0}, {Radians(1), second, 0}};
+    const auto table = OcclusionTable::from(knots, 2);
+    return !table || !ThrustCurve::from_table(*table, Radians(1));
+  };
+  EXPECT_FALSE(refused(1, 1));
+  EXPECT_TRUE(refused(1, 1.01));
+  EXPECT_TRUE(refused(0, 0));
+  EXPECT_TRUE(refused(1, -0.1));
+  EXPECT_TRUE(refused(kNaN, 1));
+  EXPECT_FALSE(ThrustCurve::from_table(OcclusionTable(), Radians(1)));
+}
+
+TEST(ThrustCurveOfATable, HasTheUncertaintyOfItsKnotsAndOfItsSlope) {
+  const ThrustCurve curve = example_table(0.002);
+  ASSERT_TRUE(curve.has_uncertainty());
+  EXPECT_FALSE(example_table().has_uncertainty());
+  const double k_t = kExampleCoefficient.value();
+  EXPECT_NEAR(curve.relative_uncertainty(Radians(0), Radians(0.1)), 0.002, 1e-12) << "k_i is held at 1";
+  EXPECT_NEAR(curve.relative_uncertainty(from_degrees(90), Radians(0)), 0.002 / 0.83, 1e-12);
+  const double slope = 0.43 / (kPi / 2), between = curve.bend_error_at(from_degrees(135)) / k_t;
+  EXPECT_GT(between, 0.001);
+  EXPECT_NEAR(curve.relative_uncertainty(from_degrees(135), Radians(0.01)),
+              std::hypot(0.002, between, 0.01 * slope) / 0.615, 1e-9);
+  EXPECT_EQ(example_table().relative_uncertainty(from_degrees(90), Radians(0)), kInfinity);
+}
+
+TEST(ThrustCurveOfATable, PerturbedIsRaisedAndScaled) {
+  const ThrustCurve curve = example_table(0.002);
+  const auto moved = curve.perturbed(0.02 * kExampleCoefficient, 1.5);
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(moved->thrust_coefficient(), kExampleCoefficient);
+  EXPECT_NEAR(moved->at(from_degrees(90)) / kExampleCoefficient, 1.02 - 1.5 * 0.17, 1e-12);
+  EXPECT_EQ(moved->standard_error_at(from_degrees(90)), curve.standard_error_at(from_degrees(90)));
+  EXPECT_FALSE(curve.perturbed(-2.0 * kExampleCoefficient, 1));
+}
+
+TEST(SpeedTrend, FindsTheSpeedThatGivesTheThrust) {
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> share(-0.2, 0.2), speed(0, 2300);
+  for (int i = 0; i < 100'000; ++i) {
+    const SpeedTrend trend{share(random) / 2000, RadPerSec(1500)};
+    const double wanted = speed(random), plain = wanted * std::sqrt(trend.factor_at(wanted));
+    EXPECT_NEAR(trend.speed_for(plain), wanted, 1e-9 * 2000) << trend.per_rad_s << " " << wanted;
+  }
+  const SpeedTrend none{0, RadPerSec(1500)};
+  for (const double plain : {0.0, 1.0, 1999.9}) EXPECT_EQ(none.speed_for(plain), plain);
+}
+
+TEST(SpeedTrend, GivesASpeedThatRisesWithTheThrustWhateverItIs) {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> share(-0.3, 0.3), log_reference(0, 5);
+  for (int i = 0; i < 500; ++i) {
+    const double reference = std::pow(10, log_reference(random));
+    const SpeedTrend trend{share(random) / reference, RadPerSec(reference)};
+    ThrustCurve curve = paper_line();
+    ASSERT_TRUE(curve.set_speed_trend(trend));
+    double before = 0;
+    for (double plain = 0; plain < 4 * reference; plain += reference / 50) {
+      const double speed = trend.speed_for(plain);
+      EXPECT_GE(speed, before - 1e-3 * reference) << trend.per_rad_s * reference << " " << plain / reference;
+      EXPECT_TRUE(std::isfinite(speed));
+      before = speed;
+    }
+  }
+  for (const double odd : {kInfinity, 1e308, 1e-308})
+    EXPECT_FALSE(std::isnan(SpeedTrend({1e-4, RadPerSec(1500)}).speed_for(odd)));
+}
+
+TEST(SpeedTrend, IsRefusedWhereItCannotBe) {
+  ThrustCurve curve = paper_line();
+  for (const double odd : {kNaN, kInfinity, -kInfinity, 0.6e-3, -0.6e-3})
+    EXPECT_FALSE(curve.set_speed_trend({odd, RadPerSec(1000)})) << odd;
+  for (const double odd : {kNaN, kInfinity, 0.0, -1.0}) EXPECT_FALSE(curve.set_speed_trend({0, RadPerSec(odd)})) << odd;
+  EXPECT_EQ(curve.speed_trend().per_rad_s, 0);
+}
+
+TEST(TorqueShare, IsOneWithoutATableAndRefusedWhereItCannotBe) {
+  ThrustCurve curve = paper_line();
+  EXPECT_EQ(curve.torque_share_at(Radians(1)), 1);
+  const auto set = [&](double share) {
+    const Knot knots[] = {{Radians(0), 1}, {Radians(2), share}};
+    return curve.set_torque_share(*OcclusionTable::from(knots, 2));
+  };
+  EXPECT_TRUE(set(0.9));
+  EXPECT_NEAR(curve.torque_share_at(Radians(1)), 0.95, 1e-15);
+  for (const double odd : {0.0, -0.5, 10.0}) EXPECT_FALSE(set(odd)) << odd;
+  EXPECT_NEAR(curve.torque_share_at(Radians(1)), 0.95, 1e-15) << "kept";
+  EXPECT_EQ(curve.torque_share_at(Radians(100)), 0.1) << "beyond its last knot it does not turn its sign";
+}
+
 TEST(ThrustCurve, IsMadeWithoutExceptions) {
   static_assert(noexcept(ThrustCurve::from_line(ThrustCoefficient(), ThrustCoefficient(), 0.0, Radians())));
   static_assert(noexcept(std::declval<const ThrustCurve&>().scaling_factor(Radians())));

@@ -8,13 +8,13 @@
 
 int main(void) {
   const kphi_real k_t = (kphi_real)1.7e-8 * (30 / PI) * (30 / PI); /* N/RPM^2 in N/(rad/s)^2 */
-  kphi_line line = {0};
+  kphi_curve line = {0};
   line.thrust_coefficient = k_t;
   line.intercept = (kphi_real)1.03 * k_t;
   line.slope_per_rad = (kphi_real)-0.0028889 * k_t * 180 / PI;
   line.largest_fitted_rad = 270 * PI / 180;
   line.overlap = KPHI_RIM_ARC;
-  if (kphi_line_doubts(&line, KPHI_LAW_CLAMPED) != 0) return 1;
+  if (kphi_curve_doubts(&line, KPHI_LAW_CLAMPED) != 0) return 1;
 
   kphi_airframe airframe = {0};
   airframe.half_side = (kphi_real)0.045;
@@ -23,7 +23,7 @@ int main(void) {
   airframe.fastest_speed = 19100 * PI / 30;
   for (int i = 0; i < 4; ++i) airframe.hinge_turns[i] = i;
 
-  const kphi_line lines[4] = {line, line, line, line};
+  const kphi_curve lines[4] = {line, line, line, line};
   kphi_compensator compensator;
   const int refusal = kphi_compensator_build(&compensator, lines, &airframe, KPHI_LAW_CLAMPED);
   if (refusal != 0) {

@@ -182,6 +182,40 @@ TEST_F(Program, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
   EXPECT_EQ(kphi({"fit", folder, "--no-report", "--accept"}).code, 0);
 }
 
+TEST_F(Program, FliesTheTableWhereKOverPhiIsNoLine) {
+  const std::string folder = (folder_ / "bent").string();
+  std::filesystem::create_directories(folder);
+  results::write_steps(folder + "/steps.csv", study_campaign({.bend = -0.2}, 1).steps);
+  const Answer line = kphi({"fit", folder, "--no-report"});
+  EXPECT_EQ(line.code, 5);
+  EXPECT_THAT(line.out, HasSubstr("fit a table (--form table)"));
+  const Answer table = kphi({"fit", folder, "--form", "table"});
+  EXPECT_EQ(table.code, 0) << table.err << table.out;
+  EXPECT_THAT(table.out, AllOf(HasSubstr("k(180 deg)"), Not(HasSubstr("k(0 deg)")), Not(HasSubstr("is not a line"))));
+  EXPECT_THAT(results::read_text(folder + "/report.html"), HasSubstr("table"));
+  const std::string page = results::read_text(folder + "/report.html");
+  ASSERT_EQ(kphi({"report", folder}).code, 0);
+  EXPECT_TRUE(results::read_text(folder + "/report.html") == page) << "the file says that it was a table";
+  const json found = json::parse(kphi({"fit", folder, "--form", "table", "--no-report", "--json"}).out);
+  ASSERT_EQ(found.at("curve").at("knots").size(), 5u);
+  EXPECT_EQ(found.at("curve").at("knots")[4].at("phi_deg"), 270);
+
+  const std::string coefficients = folder + "/coefficients.yaml";
+  const std::string vehicle = test::source_dir() + "/profiles/foldable_drone.yaml";
+  const auto compensate = [&](const std::string& files) {
+    return kphi({"compensate", "--coefficients", files, "--vehicle", vehicle},
+                "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n"
+                "180,180,180,180,1,1,1,1\n");
+  };
+  const Answer one = compensate(coefficients),
+               four = compensate(coefficients + "," + coefficients + "," + coefficients + "," + coefficients);
+  EXPECT_EQ(one.code, 0) << one.err;
+  EXPECT_EQ(one.out, four.out);
+  const Answer two = compensate(coefficients + "," + coefficients);
+  EXPECT_EQ(two.code, 2);
+  EXPECT_THAT(two.err, HasSubstr("names 2 files, but the vehicle has 4 rotors"));
+}
+
 TEST_F(Program, FitsALogWithoutOcclusionsToKTAlone) {
   const std::string folder = steps("5x3");
   auto log = results::read_steps(folder + "/steps.csv");

@@ -129,7 +129,7 @@ void mix(const Compensator* compensator, Bytes& bytes) {
 
 /// The plain interface, with codes and counts that may be any.
 void fly_in_c(Bytes& bytes) {
-  kphi_line line{};
+  kphi_curve line{};
   line.thrust_coefficient = bytes.number(1e-6);
   line.intercept = bytes.number(1e-6);
   line.slope_per_rad = bytes.number(1e-6);
@@ -149,8 +149,8 @@ void fly_in_c(Bytes& bytes) {
   for (int i = 0; i < 4; ++i) airframe.hinge_turns[i] = i;
   if (bytes.byte() % 4 == 0) airframe.hinge_turns[bytes.byte() % 4] = static_cast<signed char>(bytes.byte());
   airframe.rotors = bytes.byte() % 2 == 0 ? 0 : static_cast<signed char>(bytes.byte());
-  kphi_line lines[KPHI_MAX_ROTORS];
-  for (kphi_line& one : lines) one = line;
+  kphi_curve lines[KPHI_MAX_ROTORS];
+  for (kphi_curve& one : lines) one = line;
   kphi_compensator compensator;
   const int refusal =
       kphi_compensator_build(&compensator, lines, &airframe, static_cast<signed char>(bytes.byte()) % 3);

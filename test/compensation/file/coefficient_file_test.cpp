@@ -219,6 +219,48 @@ TEST(CoefficientFile, IsRefusedWithAValueThatCannotBe) {
   }
 }
 
+std::string with_table(const std::string& knots) {
+  return with(with(kGood, "form: line", "form: table"), "  points_deg:", "  knots: " + knots + "\n  points_deg:");
+}
+
+TEST(CoefficientFile, HoldsATable) {
+  const Coefficients c = parse_coefficients(
+      with_table("[{phi_deg: 0, value: 1.55e-06, u: 1e-9}, {phi_deg: 90, value: 1.2e-06, u: 2e-9}]"), "c.yaml");
+  EXPECT_EQ(c.form, "table");
+  EXPECT_NEAR(c.curve.at(from_degrees(45)).value(), 1.375e-6, 1e-18);
+  EXPECT_NEAR(c.curve.standard_error_at(from_degrees(45)), 1.5e-9, 1e-18);
+  EXPECT_EQ(to_degrees(c.curve.largest_fitted()), 270);
+  EXPECT_EQ(words_of(c.curve), "1.55e-06 at 0, 1.2e-06 at 90 deg");
+  EXPECT_EQ(c.parameters.back().key, "k(90)");
+  EXPECT_FALSE(parse_coefficients(with_table("[{phi_deg: 0, value: 1.55e-06}, {phi_deg: 90, value: 1.2e-06}]"), "c")
+                   .curve.has_uncertainty());
+}
+
+TEST(CoefficientFile, IsRefusedWithATableThatCannotBe) {
+  const auto refusal = [](const std::string& knots) { return refusal_of(with_table(knots)); };
+  EXPECT_THAT(refusal("[]"), HasSubstr("2 to 12 knots"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.55e-06}]"), HasSubstr("2 to 12 knots"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.5e-06}, {phi_deg: 90, value: 1.2e-06}]"), HasSubstr("is not K_T"));
+  EXPECT_THAT(refusal("[{phi_deg: 10, value: 1.55e-06}, {phi_deg: 90, value: 1.2e-06}]"), HasSubstr("is not K_T"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.55e-06}, {phi_deg: 90, value: 1.6e-06}]"), HasSubstr("rises"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.55e-06}, {phi_deg: 0, value: 1.2e-06}]"), HasSubstr("ascend"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.55e-06}, {phi_deg: 90, value: 0}]"), HasSubstr("positive"));
+  EXPECT_THAT(refusal("[{phi_deg: 0, value: 1.55e-06}, 3]"), HasSubstr("a knot has no keys"));
+}
+
+TEST(CoefficientFile, HandsTheSpeedTrendAndTheTorqueToTheCurve) {
+  const std::string more =
+      "speed_trend: {share_per_1000_rpm: 0.01, u: 0.001, reference_rpm: 12000}\n"
+      "torque: [{phi_deg: 0, k_q: 2e-8}, {phi_deg: 90, k_q: 1.8e-8}]\n";
+  const Coefficients c = parse_coefficients(kGood + more, "c.yaml");
+  EXPECT_NEAR(c.curve.speed_trend().factor_at(from_rpm(17000).value()), 1.05, 1e-12);
+  EXPECT_NEAR(c.curve.torque_share_at(from_degrees(45)), 0.95, 1e-12);
+  EXPECT_EQ(parse_coefficients(kGood, "c.yaml").curve.torque_share_at(from_degrees(45)), 1);
+  EXPECT_THAT(refusal_of(with(kGood + more, "0.01", "0.1")), HasSubstr("more than 0.3"));
+  EXPECT_THAT(refusal_of(with(kGood + more, "12000", "-1")), HasSubstr("not positive"));
+  EXPECT_THAT(refusal_of(with(kGood + more, "1.8e-8", "1.8e-6")), HasSubstr("ten times"));
+}
+
 TEST(CoefficientFile, HoldsOcclusionsOfOneTurnAtMost) {
   EXPECT_EQ(parse_coefficients(with(kGood, "[0.0, 270.0]", "[0.0, 360.0]"), "c.yaml").curve.largest_fitted(),
             from_degrees(360));

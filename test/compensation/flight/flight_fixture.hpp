@@ -52,6 +52,11 @@ inline const Shadow& example_shadow() {
 
 inline compensation::ThrustCurve bench_line() { return compensation::example_line(1.025, -0.0028889 * 1.02); }
 
+/// The same curve for each rotor.
+inline compensation::Rotors<compensation::ThrustCurve> four(const compensation::ThrustCurve& curve) {
+  return {curve, curve, curve, curve};
+}
+
 /// The curve with all that it loses against K_T scaled: 0 believes that no occlusion costs anything.
 inline compensation::ThrustCurve scaled_loss(const compensation::ThrustCurve& curve, double factor) {
   const ThrustCoefficient k_t = curve.thrust_coefficient();
@@ -66,7 +71,7 @@ inline Scene example_scene(std::uint64_t seed = 1) {
   world.mass = 1.01;
   world.thrust = {1.01, 0.99, 1.00, 1.01};
   world.cog_error = {1e-3, -0.5e-3};
-  return nominal_scene(example_vehicle(), example_settings(), bench_line(), world, seed);
+  return nominal_scene(example_vehicle(), example_settings(), four(bench_line()), world, seed);
 }
 
 /// No noise, no error of mass, rotors, arms or centre of gravity, no drag: only the loss is not what the line says.

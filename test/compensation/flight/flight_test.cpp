@@ -20,7 +20,7 @@ Eigen::Vector3d hover_error(ExperimentIndex index, const Scene& scene) {
 TEST(Hover, SinksByWhatTheLostThrustAsksOfTheProportionalGain) {
   const Scene scene = clean_scene();
   double given = 0, asked = 0;
-  Pilot pilot = *Pilot::build(scene.vehicle, scene.curve, scene.pilot);
+  Pilot pilot = *Pilot::build(scene.vehicle, scene.curves, scene.pilot);
   pilot.set_arms(scene.vehicle.o);
   pilot.compensate(false);
   pilot.look(Reference(), {{0, 0, kHeight}, {0, 0, 0}}, Eigen::Quaterniond::Identity());
@@ -58,7 +58,7 @@ TEST(Hover, TakesNoMorePowerWithCompensation) {
 
 TEST(Control, OfALineWithoutSlopeChangesNothingAtAll) {
   Scene scene = example_scene();
-  scene.curve = scaled_loss(scene.curve, 0);
+  scene.curves = four(scaled_loss(scene.curves[0], 0));
   std::vector<TraceRow> plain, helped;
   (void)flown(kHoverPlain, scene, &plain);
   (void)flown(kHoverCompensated, scene, &helped);
@@ -72,7 +72,7 @@ TEST(Control, OfALineWithoutSlopeChangesNothingAtAll) {
 TEST(Control, OfALineWithTwiceTheSlopeOvershoots) {
   Scene scene = example_scene();
   EXPECT_GT(hover_error(kHoverCompensated, scene).z(), 0) << "below: more is lost in flight than on the bench";
-  scene.curve = scaled_loss(scene.curve, 2);
+  scene.curves = four(scaled_loss(scene.curves[0], 2));
   EXPECT_LT(hover_error(kHoverCompensated, scene).z(), -0.03) << "above its reference";
 }
 

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "compensation/file/coefficient_file.hpp"
 #include "test/compensation/flight/bench_coefficients.hpp"
+#include "test/compensation/line_of.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/gnuplot.hpp"
 #include "test/source_dir.hpp"
@@ -107,6 +109,31 @@ TEST_F(Fly, LeavesTracesDrawsAndFigures) {
     EXPECT_THAT(svg, HasSubstr("</svg>")) << file;
     EXPECT_THAT(svg, HasSubstr("<path")) << file << " draws something";
   }
+}
+
+TEST_F(Fly, FliesUnlikePropellersWithAFileForEach) {
+  const compensation::ThrustCurve curve = compensation::load_coefficients(coefficients_).curve;
+  const auto write_scaled = [&](const char* name, double share) {
+    const compensation::Line line = compensation::line_of(curve);
+    const std::string path = *folder_ / (std::string(name) + ".yaml");
+    std::ofstream(path) << "format: kphi-coefficients/2\npropeller: {id: " << name << "}\nk_unit: N/(rad/s)^2\n"
+                        << "overlap: rim_arc\nK_T: {value: " << share * curve.thrust_coefficient().value()
+                        << "}\ncurve: {form: line, anchored: false, intercept: {value: "
+                        << share * line.intercept.value()
+                        << "}, slope_per_deg: {value: " << share * line.slope_per_rad * kPi / 180
+                        << "}}\nvalid: {phi_deg: [0, 270]}\n";
+    return path;
+  };
+  const std::string weak = write_scaled("weak", 1), strong = write_scaled("strong", 1.3);
+  const std::string world = *folder_ / "unlike.yaml";
+  std::ofstream(world) << "format: kphi-world/1\nname: unlike\nk_t_n_per_rpm2: "
+                       << to_newtons_per_rpm2(curve.thrust_coefficient())
+                       << "\nloss_law: quadratic\ngamma: 1.4\nrotor_thrust_share: [1, 1.3, 1, 1.3]\n";
+  const Outcome right = fly({"--world", world}, weak + "," + strong + "," + weak + "," + strong);
+  const Outcome wrong = fly({"--world", world}, weak);
+  EXPECT_EQ(right.code, 0) << right.out << right.err;
+  EXPECT_THAT(right.out, HasSubstr("strong.yaml)"));
+  EXPECT_EQ(wrong.code, 5) << wrong.out;
 }
 
 TEST_F(Fly, FliesOneExperimentAlone) {

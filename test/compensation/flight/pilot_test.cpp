@@ -126,7 +126,7 @@ TEST(RateControl, CancelsTheGyroscopicTorque) {
   EXPECT_LT((torque - rates.cross(inertia * rates)).norm(), 1e-15);
 }
 
-Pilot example_pilot() { return *Pilot::build(example_vehicle(), bench_line(), example_settings()); }
+Pilot example_pilot() { return *Pilot::build(example_vehicle(), four(bench_line()), example_settings()); }
 
 /// Of a body that stands on its reference.
 Eigen::Vector4d speeds_on_reference(Pilot& pilot) {
@@ -206,7 +206,7 @@ TEST(Pilot, KeepsEveryRotorWithinWhatItCanGiveWhateverIsDemanded) {
 TEST(Pilot, IsRefusedForAVehicleThatCannotFly) {
   Vehicle vehicle = example_vehicle();
   vehicle.airframe.arm_length = Metres(0.01);
-  EXPECT_FALSE(Pilot::build(vehicle, bench_line(), example_settings()));
+  EXPECT_FALSE(Pilot::build(vehicle, four(bench_line()), example_settings()));
 }
 
 }  // namespace pilot_test

@@ -32,7 +32,7 @@ struct Judged {
 
 Judged judged(const compensation::ThrustCurve& curve, const std::array<int, 4>& wiring = {{0, 1, 2, 3}}) {
   Scene scene = example_scene();
-  scene.curve = curve;
+  scene.curves = four(curve);
   scene.truth.wiring = wiring;
   const Findings findings = findings_of(fly_draws(scene, example_shadow(), kDraws, 2));
   return {findings, judgement_of(findings)};

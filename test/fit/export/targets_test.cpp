@@ -27,14 +27,14 @@ using ::testing::HasSubstr;
 
 const std::string kPython = "/usr/bin/python3";  // Debian's, which sees Debian's modules
 
-compensation::Coefficients coefficients() {
+compensation::Coefficients coefficients(CurveForm form = CurveForm::line) {
   Provenance provenance;
   provenance.propeller_name = "Tom's \"5x4\" -- */ <b> \\";  // made to break out of comments and quotes
   provenance.tool_version = "0.1.0";
   provenance.measured_utc = "2021-05-30T00:00:00Z";
   provenance.runs = {{"runs/5x3_phi000_rep1.h5", std::string(64, 'a'), "", std::nullopt}};
-  return compensation::parse_coefficients(format_coefficients(analysed(identify(campaign_steps())), provenance),
-                                          "c.yaml");
+  return compensation::parse_coefficients(
+      format_coefficients(analysed(identify(campaign_steps(), {.curve = {.form = form}})), provenance), "c.yaml");
 }
 
 const compensation::Coefficients& file() {
@@ -178,10 +178,9 @@ TEST(Gazebo, IsReadByXmllint) {
   EXPECT_EQ(read("count(//plugin)"), 4);
 }
 
-TEST(Header, IsReadByACompilerAndAgreesWithTheLibraryThatFlies) {
-  if (!works("c++ --version")) GTEST_SKIP() << "no compiler";
+void expect_header_of(const compensation::Coefficients& file) {
   const TemporaryFolder folder;
-  test::write_file(folder.path() / "k.hpp", to_header(file(), {}).text);
+  test::write_file(folder.path() / "k.hpp", to_header(file, {}).text);
   test::write_file(folder.path() / "main.cpp", R"(#include "k.hpp"
 #include <cstdio>
 static_assert(kphi_5x3::scaling_factor(0.0) == 1.0, "");
@@ -201,11 +200,33 @@ int main() {
   double value = 0;
   for (int degrees = 0; degrees <= 360; degrees += 15) {
     numbers >> value;
-    EXPECT_NEAR(value, file().curve.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
+    EXPECT_NEAR(value, file.curve.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
   }
   numbers >> value;
-  EXPECT_NEAR(value, 5.0 / (file().curve.thrust_coefficient().value() * file().curve.scaling_factor(Radians(1.0))),
-              1e-6);
+  EXPECT_NEAR(value, 5.0 / (file.curve.thrust_coefficient().value() * file.curve.scaling_factor(Radians(1.0))), 1e-6);
+}
+
+TEST(Header, IsReadByACompilerAndAgreesWithTheLibraryThatFlies) {
+  if (!works("c++ --version")) GTEST_SKIP() << "no compiler";
+  for (const CurveForm form : kCurveForms) expect_header_of(coefficients(form));
+}
+
+TEST(Ros2, HasTheKnotsOfATable) {
+  const std::string text = to_ros2(coefficients(CurveForm::table), {}).text;
+  EXPECT_THAT(text, HasSubstr("curve_phi_rad: [0.0, 0.785"));
+  EXPECT_THAT(text, HasSubstr("curve_k_n_s2_per_rad2: ["));
+}
+
+TEST(Targets, SayThatTheyDropAChangeOfKWithTheSpeed) {
+  compensation::Coefficients bent = coefficients();
+  ASSERT_TRUE(bent.curve.set_speed_trend({1e-4, RadPerSec(1500)}));
+  for (const Target& target : targets()) {
+    if (target.name == std::string("csv") || target.name == std::string("mcap")) continue;
+    const Export made = target.write(bent, {.turns = parse_turns("ccw,ccw,cw,cw")});
+    const bool said =
+        std::ranges::any_of(made.lost, [](const std::string& one) { return one.starts_with("change of k"); });
+    EXPECT_EQ(said, made.text.find("speed_trend") == std::string::npos) << target.name;
+  }
 }
 
 TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
