@@ -9,6 +9,10 @@ namespace kphi::test {
 struct Vehicle {
   float half_side, arm_length, propeller_radius, fastest_speed;
   float thrust_coefficient, intercept, slope_per_rad;
+  bool table;
+  float knots[4];        ///< of a table, at 45, 90, 180 and 270 degrees, as shares of K_T
+  float trend;           ///< of k with the speed, up to the fastest
+  float torque_covered;  ///< share of the drag torque at 270 degrees
   int overlap, law;
   float arms[4];
   float demand[4];  ///< thrust, roll, pitch, yaw

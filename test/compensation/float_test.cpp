@@ -35,6 +35,11 @@ class Draw {
     drawn.thrust_coefficient = between(1e-6, 3e-6);
     drawn.intercept = drawn.thrust_coefficient * between(0.97, 1.05);
     drawn.slope_per_rad = -drawn.thrust_coefficient * between(0.05, 0.2);
+    drawn.torque_covered = between(0.6, 1.1);
+    drawn.table = one_of(2) == 0;
+    float k = 1;
+    for (float& knot : drawn.knots) knot = k *= between(0.6, 1);
+    drawn.trend = one_of(3) == 0 ? 0 : between(-0.2, 0.3);
     drawn.overlap = static_cast<int>(one_of(3));
     drawn.law = static_cast<int>(one_of(2));
     for (float& arm : drawn.arms) arm = between(-1.6, 3.2);
@@ -61,7 +66,10 @@ TEST_P(InFloat, SpeedsAgreeWithDoubleToOnePartInAHundredThousand) {
     for (int j = 0; j < 4; ++j) {
       ASSERT_TRUE(std::isfinite(single.speeds[j]));
       // The same thrusts on both sides: the mixer is compared below.
-      const double speed = std::min(std::sqrt(single.thrusts[j] / real.thrust_max[j]), 1.0) * vehicle.fastest_speed;
+      const compensation::SpeedTrend trend{vehicle.trend / vehicle.fastest_speed, RadPerSec(vehicle.fastest_speed / 2)};
+      const double fastest = vehicle.fastest_speed;
+      const double plain = std::sqrt(single.thrusts[j] / real.thrust_max[j] * trend.factor_at(fastest)) * fastest;
+      const double speed = std::min(trend.speed_for(plain), fastest);
       const double off = std::fabs(single.speeds[j] - speed) / std::max(speed, 1.0);
       ++compared;
       covered += real.occlusions[j] > 0;

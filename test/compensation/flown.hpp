@@ -7,6 +7,25 @@
 
 namespace kphi::test {
 
+inline std::optional<compensation::ThrustCurve> curve_of(const Vehicle& vehicle, compensation::OverlapMeasure overlap) {
+  using namespace compensation;
+  const Radians largest(Real(4.7));
+  const Knot shares[] = {{Radians(0), 1}, {from_degrees(270), vehicle.torque_covered}};
+  Knot knots[5] = {{Radians(0), vehicle.thrust_coefficient}};
+  for (int i = 0; i < 4; ++i)
+    knots[i + 1] = {from_degrees(Real(i < 2 ? 45 * (i + 1) : 90 * i)), vehicle.thrust_coefficient * vehicle.knots[i]};
+  const auto table = OcclusionTable::from(knots, vehicle.table ? 5 : 0);
+  auto curve =
+      table ? ThrustCurve::from_table(*table, largest, overlap)
+            : ThrustCurve::from_line(ThrustCoefficient(vehicle.thrust_coefficient),
+                                     ThrustCoefficient(vehicle.intercept), vehicle.slope_per_rad, largest, overlap);
+  const auto share = OcclusionTable::from(shares, 2);
+  if (!curve || !share || !curve->set_torque_share(*share)) return std::nullopt;
+  if (!curve->set_speed_trend({vehicle.trend / vehicle.fastest_speed, RadPerSec(vehicle.fastest_speed / 2)}))
+    return std::nullopt;
+  return curve;
+}
+
 /// Numbers is Flown, or the same in double.
 template <class Numbers>
 Numbers flown(const Vehicle& vehicle) {
@@ -14,9 +33,7 @@ Numbers flown(const Vehicle& vehicle) {
   using Number = std::remove_reference_t<decltype(Numbers::speeds[0])>;
   Numbers result{};
   const auto overlap = static_cast<OverlapMeasure>(vehicle.overlap);
-  const auto curve =
-      ThrustCurve::from_line(ThrustCoefficient(vehicle.thrust_coefficient), ThrustCoefficient(vehicle.intercept),
-                             vehicle.slope_per_rad, Radians(Real(4.7)), overlap);
+  const auto curve = curve_of(vehicle, overlap);
   Airframe airframe{Metres(vehicle.half_side), Metres(vehicle.arm_length), Metres(vehicle.propeller_radius),
                     RadPerSec(0), RadPerSec(vehicle.fastest_speed)};
   airframe.overlap = overlap;

@@ -46,6 +46,18 @@ class Bytes {
 
 OverlapMeasure measure(Bytes& bytes) { return static_cast<OverlapMeasure>(bytes.byte() % 3); }
 
+std::optional<OcclusionTable> table(Bytes& bytes, double scale) {
+  Knot knots[kMostKnots + 1];
+  const std::size_t count = bytes.byte() % (kMostKnots + 2);
+  double phi = 0, value = scale;
+  for (std::size_t i = 0; i < count; ++i) {
+    knots[i] = {Radians(phi), value, bytes.byte() % 2 == 0 ? 0.01 * scale : bytes.number(scale)};
+    phi = bytes.byte() % 8 == 0 ? bytes.number(7) : phi + 0.3;
+    value = bytes.byte() % 8 == 0 ? bytes.number(scale) : 0.9 * value;
+  }
+  return OcclusionTable::from(knots, count);
+}
+
 std::optional<ThrustCurve> line(Bytes& bytes, OverlapMeasure overlap) {
   std::optional<LineUncertainty> uncertainty;
   if (bytes.byte() % 2 == 0) {
@@ -53,6 +65,19 @@ std::optional<ThrustCurve> line(Bytes& bytes, OverlapMeasure overlap) {
   }
   return ThrustCurve::from_line(ThrustCoefficient(bytes.number(1e-6)), ThrustCoefficient(bytes.number(1e-6)),
                                 bytes.number(1e-6), Radians(bytes.number(5)), overlap, uncertainty);
+}
+
+std::optional<ThrustCurve> curve_of(Bytes& bytes, OverlapMeasure overlap) {
+  const std::uint8_t kind = bytes.byte();
+  auto curve = line(bytes, overlap);
+  if (kind % 2 == 0) {
+    const auto k = table(bytes, 1e-6);
+    curve = k ? ThrustCurve::from_table(*k, Radians(bytes.number(5)), overlap) : std::nullopt;
+  }
+  if (!curve) return curve;
+  if (kind / 2 % 2 == 0) (void)curve->set_speed_trend({bytes.number(1e-4), RadPerSec(bytes.number(2000))});
+  if (const auto share = kind / 4 % 2 == 0 ? table(bytes, 1) : std::nullopt) (void)curve->set_torque_share(*share);
+  return curve;
 }
 
 Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
@@ -138,6 +163,12 @@ void fly_in_c(Bytes& bytes) {
   line.has_uncertainty = bytes.byte() % 2;
   line.thrust_coefficient_error = bytes.number(1e-8);
   line.intercept_variance = bytes.number(1e-16);
+  line.knot_count = bytes.byte() % 3 == 0 ? static_cast<signed char>(bytes.byte()) : 0;
+  for (kphi_knot& knot : line.knots) knot = {bytes.number(5), bytes.number(1e-6), bytes.number(1e-8)};
+  line.torque_count = bytes.byte() % 3 == 0 ? static_cast<signed char>(bytes.byte()) : 0;
+  for (kphi_knot& knot : line.torque) knot = {bytes.number(5), bytes.number(1), bytes.number(1)};
+  line.trend_per_rad_s = bytes.byte() % 2 == 0 ? bytes.number(1e-4) : 0;
+  line.trend_reference = bytes.number(2000);
   kphi_airframe airframe{};
   airframe.half_side = bytes.number(0.1);
   airframe.arm_length = bytes.number(0.2);
@@ -171,7 +202,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   Bytes bytes(data, size);
   const OverlapMeasure overlap = measure(bytes);
   const auto law = static_cast<ScalingLaw>(bytes.byte() % 2);
-  const auto some = line(bytes, overlap), other = line(bytes, overlap);
+  const auto some = curve_of(bytes, overlap), other = curve_of(bytes, overlap);
   const Airframe frame = airframe(bytes, overlap);
   std::optional<Compensator> compensator;
   if (some && other) {
