@@ -119,7 +119,8 @@ class Compensator {
   [[nodiscard]] const Rotors<Real>& scaling_factors() const noexcept { return scaling_factors_; }
   /// K_T k_i ω_fastest², in the air of now: what each rotor can give, for the saturation before this map.
   [[nodiscard]] const Rotors<Newtons>& thrust_max() const noexcept { return thrust_max_; }
-  /// 1/k_i times the curve's torque share at φ: by this the torque per thrust grows; for the allocation.
+  /// 1/k_i times the curve's torque share at φ: by this the torque per thrust grows; for the allocation. In
+  /// [1/kMostTorque, kMostTorque/kScalingFloor].
   [[nodiscard]] const Rotors<Real>& drag_scale() const noexcept { return drag_scale_; }
   /// Of the shape that the last set_arms told, for Mixer::set_layout, which refuses it where no angle is known yet.
   [[nodiscard]] RotorLayout layout(const Masses& masses, const Rotors<int>& spins) const noexcept {

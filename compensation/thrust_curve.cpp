@@ -55,7 +55,7 @@ bool ThrustCurve::set_speed_trend(const SpeedTrend& trend) noexcept {
 
 bool ThrustCurve::set_torque_share(const OcclusionTable& share) noexcept {
   for (const Knot& knot : share) {
-    if (!(knot.value > 0 && knot.value < 10)) return false;
+    if (!(knot.value > 0 && knot.value < kMostTorque)) return false;
   }
   torque_share_ = share;
   return true;

@@ -23,6 +23,9 @@ enum class ScalingLaw : std::uint8_t {
 /// The smallest k_i of ScalingLaw::clamped: the speed is raised by 1/sqrt(0.1) = 3.16 at most.
 inline constexpr Real kScalingFloor = Real(0.1);
 
+/// The largest torque at φ as a share of that without occlusion; its inverse the smallest.
+inline constexpr Real kMostTorque = 10;
+
 /// How well K_T and the line are known, one standard deviation, SI.
 struct LineUncertainty {
   Real thrust_coefficient = 0;  ///< of K_T [N/(rad/s)²]
@@ -75,10 +78,11 @@ class ThrustCurve {
   [[nodiscard]] const SpeedTrend& speed_trend() const noexcept { return speed_trend_; }
 
   /// Drag torque at φ as a share of that without occlusion, at one and the same speed. False, and nothing is changed,
-  /// unless each is in (0, 10). Without it the torque is taken not to depend on φ.
+  /// unless each is in (0, kMostTorque). Without it the torque is taken not to depend on φ.
   bool set_torque_share(const OcclusionTable& share) noexcept;
   [[nodiscard]] Real torque_share_at(Radians occlusion_angle) const noexcept {
-    return torque_share_.empty() ? Real(1) : std::max(Real(0.1), torque_share_.at(occlusion_angle));
+    return torque_share_.empty() ? Real(1)
+                                 : std::min(kMostTorque, std::max(1 / kMostTorque, torque_share_.at(occlusion_angle)));
   }
 
   /// K_T [N/(rad/s)²], positive.

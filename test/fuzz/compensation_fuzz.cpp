@@ -122,7 +122,8 @@ void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes&
     require(k <= 1.0 && (law == ScalingLaw::published || k >= kScalingFloor));
     require(command.speeds[i] >= frame.slowest_speed && command.speeds[i] <= frame.fastest_speed);
     require(compensator.thrust_max()[i].value() >= 0.0);
-    require(compensator.drag_scale()[i] >= 1.0 && compensator.drag_scale()[i] <= 1.0 / kScalingFloor);
+    require(compensator.drag_scale()[i] >= 1 / kMostTorque &&
+            compensator.drag_scale()[i] <= kMostTorque / kScalingFloor);
     require(uncertainties[i].value() >= 0.0);
     require(compensator.enabled() || k == 1.0);
   }
