@@ -15,6 +15,7 @@ enum class ExitCode : int {
   no_device = 3,
   safety_stop = 4,
   data_rejected = 5,
+  in_use = 6,         ///< bench or folder, by another program
   interrupted = 130,  ///< after a controlled spin-down
 };
 
@@ -53,6 +54,12 @@ class DeviceError : public Error {
   DeviceError(const std::string& device, const std::string& operation, const std::string& cause,
               const std::string& next_move = {})
       : DeviceError(device + ": " + operation + ": " + cause + (next_move.empty() ? "" : "; " + next_move)) {}
+};
+
+/// A bench or a folder that another program uses.
+class InUse : public Error {
+ public:
+  explicit InUse(const std::string& message) : Error(message, ExitCode::in_use) {}
 };
 
 /// A record that could not be written or read. Starts with "disk full: " if there was no room.

@@ -7,12 +7,29 @@
 
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
+#include "drivers/sim/control_line.hpp"
 
 namespace kphi::commands {
 
 bool has_terminal() {
   const char* term = std::getenv("TERM");
   return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
+}
+
+bool simulator_is_missing(const profiles::BenchConfig& config) {
+  if (!config.simulation || config.simulation->in_process || config.simulation->control.empty()) return false;
+  try {
+    (void)sim::tell(sim::control_path(config.simulation->control), "status");
+    return false;
+  } catch (const DeviceError&) {
+    return true;
+  }
+}
+
+void require_simulator(const profiles::BenchConfig& config) {
+  if (simulator_is_missing(config))
+    throw DeviceError(
+        fmt::format("{0}: its simulator does not run; start it in another terminal: kphi sim {0}", config.path));
 }
 
 std::string stamp_of(const daq::Bench& bench) {
@@ -30,6 +47,7 @@ std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,
     throw;
   } catch (const std::exception&) {
     daq::require_awake(wall);
+    require_simulator(config);
     throw;
   }
   daq::require_awake(wall);

@@ -12,10 +12,16 @@ namespace kphi::commands {
 /// A live line can be rewritten on stderr.
 [[nodiscard]] bool has_terminal();
 
+/// A simulated bench of `kphi sim` that does not run.
+[[nodiscard]] bool simulator_is_missing(const profiles::BenchConfig& config);
+/// Throws DeviceError with the command that starts it.
+void require_simulator(const profiles::BenchConfig& config);
+
 /// When the bench began, as names of records begin: "20210530T080000Z".
 [[nodiscard]] std::string stamp_of(const daq::Bench& bench);
 
-/// Refuses a computer that slept while it connected: the answers of the devices are outdated. Throws as connect.
+/// Refuses a computer that slept while it connected: the answers of the devices are outdated. Throws as connect, and
+/// what to start if the bench is simulated and its simulator does not run.
 [[nodiscard]] std::unique_ptr<daq::Bench> connect_awake(const profiles::BenchConfig& config,
                                                         const std::function<bool()>& stop_asked);
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "compensation/file/coefficient_file.hpp"
@@ -60,7 +61,8 @@ std::string summary_of(const BenchConfig& bench) {
       !bench.simulation ? "no"
       : bench.simulation->in_process
           ? fmt::format("in process, seed {}", bench.simulation->seed)
-          : fmt::format("{:g} times faster, seed {}", bench.simulation->time_scale, bench.simulation->seed);
+          : fmt::format("{:g} times faster, seed {}{}", bench.simulation->time_scale, bench.simulation->seed,
+                        simulator_is_missing(bench) ? "; it does not run: start it with kphi sim " + bench.path : "");
   return fmt::format(
       "  load cell  {}, {:g} Hz{}\n"
       "  motor      {} at {} baud{}, spin {:+}, at most {:.6g} RPM\n"

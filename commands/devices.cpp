@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "base/text.hpp"
+#include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/air_source.hpp"
@@ -210,6 +211,7 @@ ExitCode devices(const DevicesRequest& asked) {
     fmt::print(stderr, "kphi: {}: simulation.in_process has no devices to ask\n", asked.bench);
     return ExitCode::ok;
   }
+  if (bench) require_simulator(*bench);
   // Asking starts a stream and resets a module, which would disturb a running measurement.
   const auto locks = lock_devices(bench ? lock_names(*bench)
                                         : std::vector<std::string>{fmt::format("Net Box {}:49152", kFactoryAddress)});

@@ -12,11 +12,11 @@
 
 #include "base/text.hpp"
 #include "commands/commands.hpp"
+#include "commands/usage.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/console.hpp"
 #include "examples/second_bench/offer.hpp"
-#include "profiles/schema.hpp"
 #include "results/version.hpp"
 
 namespace {
@@ -25,14 +25,15 @@ using kphi::ExitCode;
 
 constexpr const char* kFooter =
     "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
-    "            5 data rejected, 130 interrupted after a controlled spin-down.\n"
+    "            5 data rejected, 6 bench or folder in use, 130 interrupted after a controlled spin-down.\n"
     "Data goes to stdout, messages to stderr. Data that cannot be written (closed pipe, full disk) is a failure (1);\n"
     "a run continues, and its exit code says how the run ended. NO_COLOR is honoured.\n\n"
-    "Without hardware:  kphi sim profiles/bench_simulated.yaml &\n"
-    "                   kphi run profiles/icra2021_5in_3blade.yaml --bench profiles/bench_simulated.yaml --yes\n"
+    "Without hardware:  kphi init\n"
+    "                   kphi sim bench.yaml &\n"
+    "                   kphi run campaign.yaml --bench bench.yaml --yes\n"
     "                   kphi fit results/<the folder it printed>\n"
-    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml \\\n"
-    "                            --vehicle profiles/foldable_drone.yaml";
+    "                   kphi init vehicle\n"
+    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml --vehicle vehicle.yaml";
 
 /// A file that is opened later must not get the number of a closed standard stream: messages would go into the file.
 /// The replacement can be neither read nor written.
@@ -58,22 +59,12 @@ ExitCode complain(const kphi::daq::RunStopped& stop) {
   return stop.exit_code();
 }
 
-ExitCode usage_error(const CLI::App& program, const CLI::ParseError& error, int argc, char** argv) {
+ExitCode usage_error(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& typed) {
   if (error.get_exit_code() == 0) {  // --help, --version
     program.exit(error);
     return ExitCode::ok;
   }
-  if (argc > 1 && argv[1][0] != '-' && program.get_subcommands().empty()) {
-    // CLI11 would only say that a subcommand is required.
-    std::vector<std::string> names;
-    for (const CLI::App* command : program.get_subcommands({})) names.push_back(command->get_name());
-    const auto nearest = kphi::profiles::nearest_name(argv[1], names);
-    print_message(fmt::format("kphi: unknown command \"{}\"{}\n", argv[1],
-                              nearest ? "; did you mean \"" + *nearest + "\"?" : ""));
-  } else {
-    print_message(fmt::format("kphi: {}\n", error.what()));
-  }
-  print_message("kphi --help lists the commands\n");
+  print_message(kphi::commands::explain(program, error, typed));
   return ExitCode::usage;
 }
 
@@ -99,11 +90,12 @@ ExitCode run(int argc, char** argv) {
   for (kphi::commands::AddVerb* add : kphi::commands::kVerbs) add(program, exit_code);
   program.footer(kFooter);  // a verb added later would repeat it
 
+  const std::vector<std::string> typed = kphi::commands::understood(argc, argv);
   try {
-    program.parse(argc, argv);
+    program.parse(std::vector<std::string>(typed.rbegin(), typed.rend()));  // CLI11 takes words from the end
     return exit_code;
   } catch (const CLI::ParseError& error) {
-    return usage_error(program, error, argc, argv);
+    return usage_error(program, error, typed);
   } catch (const kphi::daq::RunStopped& stop) {
     return complain(stop);
   } catch (const kphi::Error& error) {

@@ -133,6 +133,13 @@ ExitCode print_plan(const RunRequest& request) {
   return dry.ok() ? ExitCode::ok : ExitCode::usage;
 }
 
+/// What no later check would say before the first device turns or the folder is made.
+void require_possible(const DryRun& dry) {
+  for (const PlanCheck& check : dry.checks)
+    if (check.finding.severity == Severity::fault)
+      throw ConfigurationError(check.subject + ": " + check.finding.words());
+}
+
 void announce(const RunRequest& request, const DryRun& dry) {
   put(stderr, plan_text(request.campaign, request.config, dry.plan) +
                   "\nCtrl-C coasts the motor, closes the file and stops.\n");
@@ -171,6 +178,7 @@ ExitCode run(const RunOptions& options) {
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, config);
   if (destination.finished) return print_finished(destination, options.json);
+  if (!destination.resumption) require_possible(dry);
   // A resumption asks only for the missing runs: the operator reports missing answers.
   if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan.mounting_angles());
   const SignalWatch signals;  // before the words that promise it

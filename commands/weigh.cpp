@@ -5,6 +5,7 @@
 
 #include <optional>
 
+#include "base/number.hpp"
 #include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"

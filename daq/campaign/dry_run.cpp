@@ -325,8 +325,9 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
       minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
       campaign.repetitions_extra_max == 1 ? "1 run" : fmt::format("{} runs", campaign.repetitions_extra_max),
-      dry.ok() ? "nothing refused" : fmt::format("{} refused", dry.refused()), checks_text(dry.checks),
-      fmt::join(to_lines(dry.limits), "\n  "));
+      fmt::format("{} refused, {} not checked", dry.refused(),
+                  std::ranges::count(dry.checks, false, &PlanCheck::judged)),
+      checks_text(dry.checks), fmt::join(to_lines(dry.limits), "\n  "));
 }
 
 json to_json(const profiles::Plan& plan, const profiles::BenchConfig& config) {

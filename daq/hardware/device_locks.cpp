@@ -78,9 +78,9 @@ results::FileLock take(const std::string& device) {
       if (auto lock = results::FileLock::take(lock_file(device), holder)) return std::move(*lock);
       std::this_thread::sleep_for(kAskAgain);
     } while (is_dead(holder) && std::chrono::steady_clock::now() < give_up);
-    throw DeviceError(device, "lock", "in use by " + holder.words(),
-                      holder.pid == 0 ? "wait for that program or stop it"
-                                      : fmt::format("wait for it, or stop it with: kill -INT {}", holder.pid));
+    throw InUse(fmt::format("{}: in use by {}; {}", device, holder.words(),
+                            holder.pid == 0 ? "wait for that program or stop it"
+                                            : fmt::format("wait for it, or stop it with: kill -INT {}", holder.pid)));
   } catch (const RecordError& error) {
     throw DeviceError(device, "lock", error.what(), "remove that file, or ask its owner to");
   }
@@ -116,9 +116,8 @@ results::FileLock lock_folder(const results::CampaignFolder& folder) {
   results::LockHolder holder;
   auto lock = results::FileLock::take(folder.lock(), holder);
   if (lock) return std::move(*lock);
-  throw ConfigurationError(fmt::format("{}: in use by {}; wait for it, or stop it{}", folder.path().string(),
-                                       holder.words(),
-                                       holder.pid == 0 ? "" : fmt::format(" with: kill -INT {}", holder.pid)));
+  throw InUse(fmt::format("{}: in use by {}; wait for it, or stop it{}", folder.path().string(), holder.words(),
+                          holder.pid == 0 ? "" : fmt::format(" with: kill -INT {}", holder.pid)));
 }
 
 }  // namespace kphi::daq

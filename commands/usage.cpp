@@ -1,0 +1,76 @@
+#include "commands/usage.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "profiles/schema.hpp"
+
+namespace kphi::commands {
+namespace {
+
+bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-'; }
+
+std::string hint(const std::string& word, const std::vector<std::string>& names) {
+  const auto nearest = profiles::nearest_name(word, names);
+  return nearest ? fmt::format("; did you mean {}?", *nearest) : "";
+}
+
+std::vector<std::string> options_of(const CLI::App& verb) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : verb.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  return names;
+}
+
+/// The first word that `verb` does not know.
+std::string unexpected(const CLI::App& verb, const std::vector<std::string>& typed) {
+  const std::vector<std::string> names = options_of(verb);
+  for (const std::string& word : typed) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.rfind("--", 0) == 0 && name.size() > 2 && std::find(names.begin(), names.end(), name) == names.end())
+      return fmt::format("unknown option \"{}\"{}", name, hint(name, names));
+  }
+  const std::vector<std::string> left = verb.remaining();
+  return left.empty() ? "an argument too many" : fmt::format("unexpected argument \"{}\"", left.front());
+}
+
+std::string what_is_wrong(const CLI::App& verb, const CLI::ParseError& error, const std::vector<std::string>& typed) {
+  const std::string said = error.what(), unknown = unexpected(verb, typed);
+  // An unknown option also leaves its value over, or takes the place of one that is missing.
+  if (error.get_name() == "ExtrasError" || unknown.rfind("unknown option", 0) == 0) return unknown;
+  constexpr std::string_view kRequired = " is required";
+  if (error.get_name() == "RequiredError" && said.size() > kRequired.size())
+    return said.substr(0, said.rfind(kRequired)) + " is missing";
+  return said;
+}
+
+}  // namespace
+
+std::vector<std::string> understood(int argc, const char* const* argv) {
+  std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);
+  if (typed.empty()) return {"--help"};
+  if (typed.front() == "-v" || typed.front() == "version") typed.front() = "--version";
+  if (typed.front() != "help") return typed;
+  typed.erase(typed.begin());
+  typed.emplace_back("--help");
+  return typed;
+}
+
+std::string explain(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& typed) {
+  const auto verbs = program.get_subcommands();
+  if (!verbs.empty()) {
+    const std::string name = verbs.front()->get_name();
+    return fmt::format("kphi {0}: {1}\n`kphi {0} --help` explains it\n", name,
+                       what_is_wrong(*verbs.front(), error, typed));
+  }
+  const std::string last = "`kphi --help` lists the commands\n";
+  if (typed.empty() || is_option(typed.front()))
+    return fmt::format("kphi: {}\n{}", what_is_wrong(program, error, typed), last);
+  std::vector<std::string> names;
+  for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(verb->get_name());
+  return fmt::format("kphi: unknown command \"{}\"{}\n{}", typed.front(), hint(typed.front(), names), last);
+}
+
+}  // namespace kphi::commands

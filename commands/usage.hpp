@@ -1,0 +1,19 @@
+// What a person typed and did not mean: one line that says what is wrong, and where the help is.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace kphi::commands {
+
+/// The command line as `program` parses it: without the program's name, `help VERB` as `VERB --help`, nothing as
+/// `--help`, `-v` as `--version`.
+[[nodiscard]] std::vector<std::string> understood(int argc, const char* const* argv);
+
+/// Two lines for a command line that `program` could not parse: "kphi run: unknown option \"--dryrun\"; did you mean
+/// --dry-run?".
+[[nodiscard]] std::string explain(const CLI::App& program, const CLI::ParseError& error,
+                                  const std::vector<std::string>& typed);
+
+}  // namespace kphi::commands
