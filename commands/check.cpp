@@ -333,7 +333,8 @@ ExitCode check(const CheckOptions& options) {
 void add_check(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] = add_verb<CheckOptions>(
       program, exit_code, "check",
-      "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors", check);
+      "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors",
+      "kphi check my_bench.yaml my_campaign.yaml", check);
   add_argument(command, "FILE", options.paths,
                "files; campaigns are also checked against the benches and answers among them");
   command.add_flag("--json", options.json, "print one JSON object per file on a line of its own");

@@ -17,22 +17,28 @@ using Json = nlohmann::ordered_json;
 
 /// Adds a verb to the program. If the verb was given, parsing the command line runs it and sets `exit_code`.
 using AddVerb = void(CLI::App& program, ExitCode& exit_code);
-AddVerb add_init, add_check, add_sim, add_devices, add_spin, add_weigh, add_run, add_replay, add_info, add_verify,
-    add_import, add_fit, add_report, add_compare, add_export, add_compensate, add_fly, add_completion;
+AddVerb add_init, add_list, add_check, add_sim, add_devices, add_spin, add_weigh, add_run, add_replay, add_info,
+    add_verify, add_import, add_fit, add_report, add_compare, add_export, add_compensate, add_fly, add_completion;
 
 /// In the order of `kphi --help`.
-inline constexpr AddVerb* kVerbs[] = {add_init,   add_check,   add_sim,    add_devices,    add_spin,   add_weigh,
-                                      add_run,    add_replay,  add_info,   add_verify,     add_import, add_fit,
-                                      add_report, add_compare, add_export, add_compensate, add_fly,    add_completion};
+inline constexpr AddVerb* kVerbs[] = {add_init,   add_check,      add_sim,    add_devices,   add_spin,
+                                      add_weigh,  add_run,        add_replay, add_list,      add_info,
+                                      add_verify, add_import,     add_fit,    add_report,    add_compare,
+                                      add_export, add_compensate, add_fly,    add_completion};
 
-/// A verb that calls `run` with its options, which live as long as the program.
+/// A verb that calls `run` with its options, which live as long as the program. Its --help ends with `example`.
 template <class Options>
 std::pair<CLI::App&, Options&> add_verb(CLI::App& program, ExitCode& exit_code, const char* name, const char* what,
-                                        ExitCode (*run)(const Options&)) {
+                                        const char* example, ExitCode (*run)(const Options&)) {
   const auto options = std::make_shared<Options>();
-  CLI::App* command = program.add_subcommand(name, what);
+  CLI::App* command = program.add_subcommand(name, what)->footer(example);
   command->callback([options, run, &exit_code] { exit_code = run(*options); });
   return {*command, *options};
+}
+
+/// Text below the options, before the example.
+inline void add_notes(CLI::App& command, const std::string& notes) {
+  command.footer(notes + "\n\n" + command.get_footer());
 }
 
 /// A required value that stands by itself; --help shows its `name` only.

@@ -116,7 +116,10 @@ ExitCode run_export(const ExportRequest& request) {
 void add_compare(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<CompareRequest>(
       program, exit_code, "compare",
-      "compare two results (differences, uncertainties, verdict) or the propellers of a family", run_compare);
+      "compare two results (differences, uncertainties, verdict) or the propellers of a family",
+      "kphi compare results/<monday> results/<tuesday> --expect agree\n"
+      "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3",
+      run_compare);
   add_argument(command, "RESULT", request.results,
                "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or the fitted folders of "
                "several propellers")
@@ -134,14 +137,14 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--predict", "DIAMETERxBLADES", request.predict,
             "predict k of a propeller that nobody measured, from three others; may be repeated")
       ->allow_extra_args(false);
-  command.footer(
-      "kphi compare results/<monday> results/<tuesday> --expect agree\n"
-      "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3");
 }
 
 void add_export(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ExportRequest>(
-      program, exit_code, "export", "write coefficients for a flight stack, or samples for a viewer", run_export);
+      program, exit_code, "export", "write coefficients for a flight stack, or samples for a viewer",
+      "kphi export results/<folder> --to px4 --speed-max-rpm 19100\n"
+      "kphi export results/<folder>/runs/5x3_phi090_rep2.h5 --to mcap --out run.mcap",
+      run_export);
   add_argument(command, "FILE", request.file, "coefficients.yaml, campaign folder, or a run (RUN.h5, to csv or mcap)")
       ->check(kExistingPath);
   std::vector<std::string> names;
@@ -163,12 +166,12 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
           "--turns", [&request = request](const std::string& text) { request.options.turns = parse_turns(text); },
           "how the motors turn, seen from above, for the sign of their torque (px4, gazebo)")
       ->type_name("ccw,cw,…");
-  command.footer(
+  add_notes(
+      command,
       "Targets:\n" + footer +
-      "\nkphi export results/<folder> --to px4 --speed-max-rpm 19100\n"
-      "kphi export results/<folder>/runs/5x3_phi090_rep2.h5 --to mcap --out run.mcap\n"
-      "\nkphi lists on stderr what a target cannot hold.\n"
-      "No export to ArduPilot's MOT_THST_EXPO or Betaflight's thrust_linear: they shape the command, they hold no k.");
+          "\nkphi lists on stderr what a target cannot hold.\n"
+          "No export to ArduPilot's MOT_THST_EXPO or Betaflight's thrust_linear: they shape the command, they hold "
+          "no k.");
 }
 
 }  // namespace kphi::commands

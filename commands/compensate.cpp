@@ -230,8 +230,10 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
 void add_compensate(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<CompensateRequest>(
       program, exit_code, "compensate",
-      "turn rows of arm angles and thrusts (CSV on stdin) into occlusions, k_i and rotor speeds", compensate);
-  command.footer(
+      "turn rows of arm angles and thrusts (CSV on stdin) into occlusions, k_i and rotor speeds",
+      "kphi compensate --coefficients coefficients.yaml --vehicle vehicle.yaml < demands.csv", compensate);
+  add_notes(
+      command,
       "Columns in: theta1_deg … theta4_deg, thrust1_n … thrust4_n, in any order; others are ignored.\n"
       "Columns out: phi1_deg …, k1 … (k_i of equation 4), speed1_rpm …, flags (rotor:what, separated by blanks).\n"
       "A row that cannot be used is skipped and reported on stderr; the exit code is then 5.");

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "base/csv.hpp"
+#include "base/number.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "compensation/file/plausibility.hpp"
@@ -294,15 +295,16 @@ void add_choice(CLI::App& command, const std::string& option, Enum& into, const 
                 std::initializer_list<Enum> values) {
   std::map<std::string, Enum> known;
   for (const Enum value : values) known.emplace(name_of(value), value);
-  std::string all;
-  for (const auto& [name, value] : known) all += (all.empty() ? "" : ", ") + name;
+  std::vector<std::string> names;
+  for (const auto& [name, value] : known) names.push_back(name);
+  const std::string all = fmt::format("{}", fmt::join(names, ", "));
   const auto take = [&into, option, known, all](const std::string& word) {
     const auto found = known.find(word);
     if (found == known.end()) throw CLI::ValidationError(option, fmt::format("\"{}\" is not one of {}", word, all));
     into = found->second;
   };
-  command.add_option_function<std::string>(option, take, fmt::format("{}: {} (default: {})", what, all, name_of(into)))
-      ->type_name("WORD");
+  command.add_option_function<std::string>(option, take, fmt::format("{} (default: {})", what, name_of(into)))
+      ->type_name(fmt::format("{{{}}}", fmt::join(names, ",")));
 }
 
 struct ReportRequest {
@@ -340,7 +342,8 @@ ExitCode run_report(const ReportRequest& request) {
 
 void add_fit(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FitRequest>(
-      program, exit_code, "fit", "fit k to the steps of each occlusion, then the curve k(φ); write a report", run_fit);
+      program, exit_code, "fit", "fit k to the steps of each occlusion, then the curve k(φ); write a report",
+      "kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml", run_fit);
   add_argument(command, "INPUT", request.path,
                "campaign folder, steps.csv, or K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…]")
       ->check(kExistingPath);
@@ -387,17 +390,18 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   command.add_flag("--no-report", request.no_report, "write coefficients only");
   command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
   command.add_flag("--json", request.json, "print the result as JSON");
-  command.footer("kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml");
 }
 
 void add_report(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ReportRequest>(
-      program, exit_code, "report", "draw report.html of fitted campaigns again, several on one page", run_report);
+      program, exit_code, "report", "draw report.html of fitted campaigns again, several on one page",
+      "kphi report results/<folder>\nkphi report results/<5x2> results/<5x3> results/<6x2> results/<6x3> --out "
+      "four.html",
+      run_report);
   add_argument(command, "DIR", request.folders, "campaign folders with steps.csv and coefficients.yaml")
       ->check(kExistingFolder);
   add_value(command, "--out", "FILE", request.out,
             "page (default: report.html in DIR; for several DIRs: in the working folder)");
-  command.footer("kphi report results/<5x2> results/<5x3> results/<6x2> results/<6x3> --out four.html");
 }
 
 }  // namespace kphi::commands

@@ -288,8 +288,10 @@ ExitCode fly_as_asked(const FlyRequest& request) {
 void add_fly(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FlyRequest>(
       program, exit_code, "fly",
-      "fly the paper's nine experiments in simulation with these coefficients, before propellers turn", fly_as_asked);
-  command.footer(
+      "fly the paper's nine experiments in simulation with these coefficients, before propellers turn",
+      "kphi fly --coefficients coefficients.yaml --vehicle vehicle.yaml --draws 400", fly_as_asked);
+  add_notes(
+      command,
       "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.\n"
       "The exit code is 5 where the verdict is that the coefficients are not fit to fly.");
   add_flight_files(command, request.coefficients, request.vehicle);

@@ -136,6 +136,8 @@ ExitCode run_import(const ImportRequest& request) {
 void add_import(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ImportRequest>(
       program, exit_code, "import", "turn RCbenchmark CSV, UIUC static tables and any other CSV into step tables",
+      "kphi import logs/*.csv --out tables\n"
+      "kphi import own.csv --out tables --column 'thrust=Load [g]' --column speed=n:rpm --column occlusion=phi_deg",
       run_import);
   RowSelection& rows = request.options.rows;
   add_argument(command, "FILE", request.files, "tables; units come from their headers")->check(kExistingFile);
@@ -171,9 +173,6 @@ void add_import(CLI::App& program, ExitCode& exit_code) {
   command.add_flag("--same-propeller", request.same_propeller,
                    "all FILEs are of one propeller: name those whose k differs from the others");
   command.add_flag("--json", request.json, "print one JSON record per table");
-  command.footer(
-      "kphi import logs/*.csv --out tables\n"
-      "kphi import own.csv --out tables --column 'thrust=Load [g]' --column speed=n:rpm --column occlusion=phi_deg");
 }
 
 }  // namespace kphi::commands

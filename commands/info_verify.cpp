@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "base/text.hpp"
+#include "commands/campaign_summary.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "results/campaign_folder.hpp"
@@ -70,7 +71,10 @@ Json describe_folder(const CampaignFolder& folder) {
   for (const auto& path : folder.reference_runs()) runs.push_back(describe(path));
   Json others = Json::array();
   for (const auto& path : folder.other_runs()) others.push_back(path.string());
-  return {{"folder", folder.path().string()}, {"runs", runs}, {"not_complete", others}};
+  Json told = to_json(summary_of(folder));
+  told["runs"] = runs;
+  told["not_complete"] = others;
+  return told;
 }
 
 void print_run(const Json& run) {
@@ -89,8 +93,8 @@ void print_run(const Json& run) {
   }
 }
 
-void print_folder(const Json& folder) {
-  fmt::print("{}: {} complete runs\n", folder["folder"].get<std::string>(), folder["runs"].size());
+void print_folder(const std::string& path, const Json& folder) {
+  fmt::print("{}", to_text(summary_of(CampaignFolder::open(path))));
   for (const Json& run : folder["runs"]) {
     fmt::print("  {}: {} at {}°, repetition {}, {} steps, {} samples, {} lost\n",
                std::filesystem::path(run["file"].get<std::string>()).filename().string(),
@@ -105,8 +109,13 @@ void print_folder(const Json& folder) {
 
 ExitCode info(const VerifyRequest& asked) {
   const bool folder = std::filesystem::is_directory(asked.path);
-  const Json found = folder ? describe_folder(CampaignFolder::open(asked.path)) : describe(asked.path);
-  asked.json ? print_json(found) : folder ? print_folder(found) : print_run(found);
+  Json found;
+  try {
+    found = folder ? describe_folder(CampaignFolder::open(asked.path)) : describe(asked.path);
+  } catch (const RecordError& error) {
+    throw DataRejected(fmt::format("{}; kphi info takes a campaign folder or a file of its runs/", error.what()));
+  }
+  asked.json ? print_json(found) : folder ? print_folder(asked.path, found) : print_run(found);
   return ExitCode::ok;
 }
 
@@ -165,9 +174,9 @@ ExitCode verify(const VerifyRequest& asked) {
   return problems.empty() ? ExitCode::ok : ExitCode::data_rejected;
 }
 
-void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what,
+void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* what, const char* example,
          ExitCode (*run)(const VerifyRequest&)) {
-  const auto [command, asked] = add_verb<VerifyRequest>(program, exit_code, name, what, run);
+  const auto [command, asked] = add_verb<VerifyRequest>(program, exit_code, name, what, example, run);
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");
 }
@@ -175,11 +184,12 @@ void add(CLI::App& program, ExitCode& exit_code, const char* name, const char* w
 }  // namespace
 
 void add_info(CLI::App& program, ExitCode& exit_code) {
-  add(program, exit_code, "info", "show the contents of a run or campaign folder", info);
+  add(program, exit_code, "info", "show the contents of a run or campaign folder", "kphi info results/<folder>", info);
 }
 
 void add_verify(CLI::App& program, ExitCode& exit_code) {
-  add(program, exit_code, "verify", "check a run or campaign folder for damage (exit code 5: damaged)", verify);
+  add(program, exit_code, "verify", "check a run or campaign folder for damage (exit code 5: damaged)",
+      "kphi verify results/<folder>", verify);
 }
 
 }  // namespace kphi::commands

@@ -187,6 +187,7 @@ ExitCode show_replay(const ReplayRequest& asked) {
 void add_replay(CLI::App& program, ExitCode& exit_code) {
   const auto [command, asked] = add_verb<ReplayRequest>(
       program, exit_code, "replay", "compute the step means again from the raw samples and compare them with steps.csv",
+      "kphi replay results/<folder>\nkphi replay results/<folder>/runs/5x3_phi090_rep2.h5 --live --speed 5",
       [](const ReplayRequest& it) { return it.live.any() ? show_replay(it) : run_replay(it); });
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
   command.add_flag("--json", asked.json, "print one JSON object");

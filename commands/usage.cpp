@@ -38,9 +38,10 @@ std::string unexpected(const CLI::App& verb, const std::vector<std::string>& typ
 std::string what_is_wrong(const CLI::App& verb, const CLI::ParseError& error, const std::vector<std::string>& typed) {
   const std::string said = error.what(), unknown = unexpected(verb, typed);
   // An unknown option also leaves its value over, or takes the place of one that is missing.
-  if (error.get_name() == "ExtrasError" || unknown.rfind("unknown option", 0) == 0) return unknown;
+  const auto is = [&](CLI::ExitCodes code) { return error.get_exit_code() == static_cast<int>(code); };
+  if (is(CLI::ExitCodes::ExtrasError) || unknown.rfind("unknown option", 0) == 0) return unknown;
   constexpr std::string_view kRequired = " is required";
-  if (error.get_name() == "RequiredError" && said.size() > kRequired.size())
+  if (is(CLI::ExitCodes::RequiredError) && said.size() > kRequired.size())
     return said.substr(0, said.rfind(kRequired)) + " is missing";
   return said;
 }

@@ -401,9 +401,11 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
     read_provenance(*map, coefficients.provenance);
-  if (top.find("uncertainty"))
-    for (const Value& source : top.map_at("uncertainty").list("not_known"))
-      coefficients.not_known.push_back(source.text());
+  if (top.find("uncertainty")) {
+    const Value uncertainty = top.map_at("uncertainty");
+    for (const Value& source : uncertainty.list("not_known")) coefficients.not_known.push_back(source.text());
+    coefficients.verdict = uncertainty.text_at("verdict");
+  }
   return coefficients;
 }
 

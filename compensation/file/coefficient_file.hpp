@@ -85,6 +85,7 @@ struct Coefficients {
   std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
   std::vector<Parameter> parameters;              ///< of the curve
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
+  std::string verdict;                            ///< of the fit: fit_to_fly, with_care, not_yet; empty: not told
   bool anchored = false;                          ///< k(0) of the curve is K_T
   std::vector<Radians> points;                    ///< occlusions behind the curve
   Radians smallest_occlusion;                     ///< of the valid range of φ

@@ -24,9 +24,9 @@ TEST(Locks, RefuseASecondProgramAndNameTheFirstWhichIsNotDisturbed) {
   const std::string holder = fmt::format("in use by process {} (", first.pid());
   for (const auto& command : {bench.run_command(), std::vector<std::string>{kphi(), "devices", "--wake-ups", "0.1",
                                                                             "--bench", bench.path("bench.yaml")}}) {
-    EXPECT_THAT(ran(command, 3).err, AllOf(HasSubstr(holder), HasSubstr(fmt::format("kill -INT {}", first.pid()))));
+    EXPECT_THAT(ran(command, 6).err, AllOf(HasSubstr(holder), HasSubstr(fmt::format("kill -INT {}", first.pid()))));
   }
-  EXPECT_THAT(ran(resume_command(bench, folder_of(bench)), 2).err,
+  EXPECT_THAT(ran(resume_command(bench, folder_of(bench)), 6).err,
               AllOf(HasSubstr(holder), HasSubstr("wait for it, or stop it with")));
   EXPECT_EQ(first.wait(), 0) << first.err();
 }

@@ -84,6 +84,8 @@ inline const std::vector<Room>& rooms() {
        {"base", "compensation/units.hpp", "profiles/bench_config.hpp", "drivers", "results/records.hpp", "daq/bench"}},
 
       {"commands", {"base", "compensation", "profiles", "drivers", "results", "daq", "fit", "examples"}},
+      {"commands/shell", {"base", "commands"}},
+      {"commands/stand", {"base", "compensation", "profiles", "drivers", "results", "daq", "commands"}},
   };
   return kRooms;
 }

@@ -208,7 +208,7 @@ TEST_F(VerifiedCampaign, InfoTellsWhatHappenedToTheStreamAndHowItDid) {
 
 TEST_F(VerifiedCampaign, InfoTellsWhatIsInAFolder) {
   std::ofstream(folder_.runs() / "5x3_phi180_rep1.h5.part") << "x";
-  EXPECT_THAT(say("info " + folder_.path().string()).out, HasSubstr("1 complete runs"));
+  EXPECT_THAT(say("info " + folder_.path().string()).out, HasSubstr("runs        1"));
   const auto json = nlohmann::json::parse(say("info --json " + folder_.path().string()).out);
   EXPECT_EQ(json.at("runs").size(), 1u);
   EXPECT_EQ(json.at("not_complete").size(), 1u);

@@ -82,7 +82,7 @@ TEST(FolderLock, RefusesTheSecondWriter) {
   const auto results = results::CampaignFolder::create(folder.path(), "u", "c");
   {
     const auto first = lock_folder(results);
-    EXPECT_THROW((void)lock_folder(results), ConfigurationError);
+    EXPECT_THROW((void)lock_folder(results), InUse);
   }
   EXPECT_NO_THROW((void)lock_folder(results));
 }

@@ -156,7 +156,8 @@ ExitCode spin(const SpinOptions& options) {
 
 void add_spin(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] =
-      add_verb<SpinOptions>(program, exit_code, "spin", "turn the motor by hand, guarded and recorded as a run", spin);
+      add_verb<SpinOptions>(program, exit_code, "spin", "turn the motor by hand, guarded and recorded as a run",
+                            "kphi spin --bench my_bench.yaml --rpm 6000", spin);
   add_value(command, "--bench", "FILE", options.bench, "bench file")->required()->check(kExistingFile);
   auto* rpm = add_value(command, "--rpm", "RPM", options.rpm, "speed to begin with")->check(CLI::Range(1.0, 1e5));
   add_value(command, "--percent", "P", options.percent, "speed to begin with, of the highest that is allowed")

@@ -246,8 +246,9 @@ ExitCode devices(const DevicesRequest& asked) {
 }  // namespace
 
 void add_devices(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, asked] = add_verb<DevicesRequest>(
-      program, exit_code, "devices", "find and identify the devices, list what is wrong with them", devices);
+  const auto [command, asked] = add_verb<DevicesRequest>(program, exit_code, "devices",
+                                                         "find and identify the devices, list what is wrong with them",
+                                                         "kphi devices --bench my_bench.yaml", devices);
   CLI::Option* bench =
       add_value(command, "--bench", "FILE", asked.bench, "bench file (default: try only the Net Box's factory address)")
           ->check(kExistingFile);

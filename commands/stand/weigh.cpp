@@ -175,7 +175,8 @@ ExitCode weigh(const WeighOptions& options) {
 
 void add_weigh(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] = add_verb<WeighOptions>(
-      program, exit_code, "weigh", "check the load cell with a known mass, on and off, the motor at rest", weigh);
+      program, exit_code, "weigh", "check the load cell with a known mass, on and off, the motor at rest",
+      "kphi weigh --bench my_bench.yaml --kg 0.5", weigh);
   add_value(command, "--bench", "FILE", options.bench, "bench file")->required()->check(kExistingFile);
   add_value(command, "--kg", "KG", options.kg, "the mass")->required()->check(CLI::Range(0.001, 1000.0));
   add_value(command, "--u-kg", "KG", options.u_kg, "its standard uncertainty (default: a weight of class M3, 0.03 %)")

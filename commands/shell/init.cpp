@@ -6,7 +6,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
-#include "commands/templates.hpp"
+#include "commands/shell/templates.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -93,13 +93,13 @@ ExitCode init(const InitRequest& request) {
 
 void add_init(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<InitRequest>(
-      program, exit_code, "init", "write a commented campaign, bench or vehicle file to begin with", init);
+      program, exit_code, "init", "write a commented campaign, bench or vehicle file to begin with",
+      "kphi init\nkphi init bench --out my_bench.yaml", init);
   command.add_option("KIND", request.kind, "what to write (default: campaign.yaml and a simulated bench.yaml)")
       ->type_name("{campaign,bench,vehicle}")
       ->check(CLI::IsMember({"campaign", "bench", "vehicle"}).description(""));
   add_value(command, "--out", "FILE", request.out, "file to write (default: KIND.yaml); it must not exist");
   command.add_flag("--simulated", request.simulated, "a bench that `kphi sim` simulates");
-  command.footer("kphi init\nkphi init bench --out my_bench.yaml");
 }
 
 }  // namespace kphi::commands

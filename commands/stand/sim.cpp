@@ -190,7 +190,8 @@ ExitCode run(const SimRequest& options) {
 
 void add_sim(CLI::App& program, ExitCode& exit_code) {
   const auto [sim, options] = add_verb<SimRequest>(
-      program, exit_code, "sim", "run the simulated bench of a bench file, or control a running one", run);
+      program, exit_code, "sim", "run the simulated bench of a bench file, or control a running one",
+      "kphi sim bench.yaml --truth truth.yaml\nkphi sim bench.yaml --mount '5x3 90'", run);
   add_argument(sim, "BENCH", options.bench, "bench file with a `simulation` section");
   add_value(sim, "--truth", "FILE", options.truth,
             "write the true coefficients of the simulated propellers to FILE (YAML)");

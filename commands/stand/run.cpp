@@ -198,7 +198,10 @@ ExitCode run(const RunOptions& options) {
 
 void add_run(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] =
-      add_verb<RunOptions>(program, exit_code, "run", "run a campaign on a bench and record it", run);
+      add_verb<RunOptions>(program, exit_code, "run", "run a campaign on a bench and record it",
+                           "kphi run my_campaign.yaml --bench my_bench.yaml --live\nkphi run --bench my_bench.yaml "
+                           "--resume results/<folder>",
+                           run);
   command
       .add_option("CAMPAIGN", options.campaign, "campaign file (optional with --resume: default is the folder's copy)")
       ->type_name("");
