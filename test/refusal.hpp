@@ -1,4 +1,4 @@
-// The words of a device's refusal.
+// The words of a refusal.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@
 
 namespace kphi {
 
-/// Of the DeviceError that the call throws; empty: none.
+/// Of the error of kphi that the call throws; empty: none.
 template <class Call>
 [[nodiscard]] std::string refusal(Call&& call) {
   try {
     (void)call();
-  } catch (const DeviceError& error) {
+  } catch (const Error& error) {
     return error.what();
   }
   return "";

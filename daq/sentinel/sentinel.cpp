@@ -23,15 +23,17 @@ constexpr const char* kProgram = "kphi-sentinel";
 
 [[noreturn]] void fail(int error, const std::string& doing) {
   throw DeviceError("sentinel", doing, std::generic_category().message(error),
-                    fmt::format("install kphi again: {} belongs beside it; without it a program that is killed leaves "
+                    fmt::format("install kphi again: {} belongs beside it, or into ../libexec/kphi; without it a program that is killed leaves "
                                 "the supply on",
                                 kProgram));
 }
 
 std::string path_of_program() {
   std::error_code none;
-  const auto beside = std::filesystem::read_symlink("/proc/self/exe", none).parent_path() / kProgram;
-  return std::filesystem::exists(beside, none) ? beside.string() : kProgram;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", none).parent_path();
+  for (const auto& place : {folder / kProgram, (folder / "../libexec/kphi" / kProgram).lexically_normal()})
+    if (std::filesystem::exists(place, none)) return place.string();
+  return kProgram;
 }
 
 std::string in_hex(const std::string& bytes) {
