@@ -49,10 +49,8 @@ void print_table(const std::vector<CampaignSummary>& campaigns) {
     const std::string verdict = !one.damage.empty()        ? "damaged"
                                 : !one.safety_stop.empty() ? "safety stop"
                                                            : one.verdict;
-    // ± is two bytes and one column.
-    fmt::print("{:<16}  {:<9} {:<9} {:<{}} {:<14} {}\n", minute_of(one.started_utc), printable(one.propeller),
-               one.progress(), one.coefficient(), 24 + (one.expanded_95 ? 1 : 0), verdict,
-               fs::path(one.folder).filename().string());
+    fmt::print("{:<16}  {:<9} {:<9} {:<24} {:<14} {}\n", minute_of(one.started_utc), printable(one.propeller),
+               one.progress(), one.coefficient(), verdict, fs::path(one.folder).filename().string());
   }
 }
 

@@ -1,0 +1,59 @@
+#!/bin/sh
+# The first hour of a stranger: a fresh Debian, the packages installed, a campaign on the simulated bench as an ordinary
+# user in dialout, the library found by a compiler, and nothing left after a purge. As root: FOLDER_OF_PACKAGES [MIRROR]
+set -eu
+packages=$(readlink -f "$1") mirror=${2:-}
+root=$(mktemp -d /var/tmp/kphi-try.XXXXXX)
+chmod 755 "$root"
+cleanup() {
+  umount "$root/proc" 2>/dev/null || true
+  umount -R "$root/dev" 2>/dev/null || true
+  rm -rf --one-file-system "$root"
+}
+trap cleanup EXIT
+# shellcheck disable=SC2086
+debootstrap --variant=minbase bookworm "$root" $mirror >"$root.log" 2>&1 || { tail "$root.log" >&2; exit 1; }
+rm -f "$root.log"
+mount -t proc proc "$root/proc"
+mount --rbind /dev "$root/dev"
+mount --make-rslave "$root/dev"
+for list in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/ssl/certs; do
+  if [ -e "$list" ]; then rm -rf "${root:?}$list"; cp -rLf "$list" "$root$(dirname "$list")/" 2>/dev/null || true; fi
+done
+[ -e /etc/apt/sources.list ] || rm -f "$root/etc/apt/sources.list"
+cp -f /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null || true
+inside() { chroot "$root" /bin/sh -ec "$1"; }
+inside 'apt-get update -q >/dev/null'
+# What was there before, to find what a purge leaves.
+listing() { (cd "$root" && find etc usr var/lib -xdev -path 'usr/share/man' -prune -o -name '*kphi*' -print | sort); }
+before=$(listing)
+mkdir -p "$root/packages"
+cp "$packages"/*.deb "$root/packages/"
+inside 'DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /packages/kphi_*.deb >/dev/null'
+inside 'useradd -m -G dialout stranger'
+cat >"$root/home/stranger/first.sh" <<'FIRST'
+set -e
+cd "$(mktemp -d)"
+kphi --version
+kphi init
+kphi check campaign.yaml bench.yaml
+kphi sim bench.yaml >sim.log 2>&1 &
+sim=$!
+trap 'kill $sim' EXIT
+until kphi sim bench.yaml --status >/dev/null 2>&1; do sleep 0.2; done
+kphi devices --bench bench.yaml --wake-ups 0 | head -3
+kphi run campaign.yaml --bench bench.yaml --yes >folder 2>run.log || { tail run.log; exit 1; }
+kphi fit "$(cat folder)"
+kphi list
+grep -c '<svg' "$(cat folder)/report.html"
+kphi init vehicle
+kphi fly --coefficients "$(cat folder)/coefficients.yaml" --vehicle vehicle.yaml | tail -3
+FIRST
+inside 'su - stranger -c "sh first.sh"'
+inside 'DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /packages/libkphi-compensation-dev_*.deb g++ pkg-config >/dev/null
+  printf "#include \"compensation/compensator.hpp\"\nint main() { return kphi::compensation::doubts_about(*kphi::compensation::ThrustCurve::from_line(kphi::ThrustCoefficient(1e-6), kphi::ThrustCoefficient(1e-6), -1e-7, kphi::Radians(4)), {}).gains_with_occlusion; }\n" >/tmp/t.cpp
+  g++ -std=c++17 /tmp/t.cpp $(pkg-config --cflags --libs kphi_compensation) -o /tmp/t && /tmp/t && echo "library linked"'
+inside 'apt-get purge -y -q kphi libkphi-compensation-dev >/dev/null'
+after=$(listing)
+[ "$before" = "$after" ] || { echo "left after the purge:"; echo "$after"; exit 1; }
+echo "purged: nothing left"
