@@ -189,7 +189,15 @@ class CampaignRun {
       if (config_.ambient.known() && !bench_.air())
         progress_.say("air: no current reading; air density of this run unknown");
       const auto awake = keep(&Bench::keep_awake, "may_sleep");
-      const RunOrder order{campaign_, config_, *mounted_, capped, remaining_s, file};
+      const RunOrder order{campaign_,
+                           config_,
+                           *mounted_,
+                           capped,
+                           remaining_s,
+                           file,
+                           nullptr,
+                           static_cast<int>(result_.runs) + 1,
+                           static_cast<int>(planned_)};
       (void)keep(&Bench::keep_prompt, "may_be_late");  // asked for again by the run itself: only to tell a refusal
       accept(record_run(bench_, order, progress_, stop_asked_), planned);
     } catch (...) {
@@ -219,6 +227,8 @@ class CampaignRun {
   bool ask_for_another(const AnotherRun& question) {
     const RestGuard guard(bench_, true);
     person_.while_waiting([&] { guard.check(); });
+    progress_.asks(fmt::format("Run {:g}° again? {}", question.occlusion_deg, question.reason));
+    const Answered answered(progress_);
     const bool yes = person_.run_again(question);
     person_.while_waiting({});
     return yes;
@@ -285,7 +295,22 @@ class CampaignRun {
          {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});
   }
 
+  /// However the question ends.
+  class Answered {
+   public:
+    explicit Answered(Progress& progress) : progress_(progress) {}
+    Answered(const Answered&) = delete;
+    Answered& operator=(const Answered&) = delete;
+    ~Answered() { progress_.asks(""); }
+
+   private:
+    Progress& progress_;
+  };
+
   MountConfirmation let_mount(double occlusion_deg) {
+    progress_.asks(occlusion_deg == 0 ? "Take the occlusion off, then type 0."
+                                      : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg));
+    const Answered answered(progress_);
     return ask_at_the_stand(bench_, person_, stop_asked_, [&](const std::string& condition) {
       return person_.confirm_mounting(campaign_.propeller, occlusion_deg, condition);
     });

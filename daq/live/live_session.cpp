@@ -64,6 +64,11 @@ void LiveProgress::say(const std::string& line) {
   feed_.tell(line_message(to_seconds(clock_.now()), line));
 }
 
+void LiveProgress::asks(const std::string& question) {
+  inner_.asks(question);
+  feed_.tell(ask_message(question));
+}
+
 LiveSession::LiveSession(const LiveOptions& options, Subject subject) : subject_(std::move(subject)) {
   if (!options.udp_json.empty()) plotter_ = std::make_unique<UdpJson>(options.udp_json, subject_.limits);
   if (!options.port) return;

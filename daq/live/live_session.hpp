@@ -39,6 +39,7 @@ class LiveProgress final : public Progress {
   void tick(const Position& position, const Observation& seen) override;
   void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
+  void asks(const std::string& question) override;
 
  private:
   void add_to_step(const Position& position, const Observation& seen, Instant now);

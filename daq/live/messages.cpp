@@ -71,7 +71,7 @@ std::string tick_message(const Tick& tick, double silent_s, std::uint64_t droppe
                        {"remaining_s", rounded(at.remaining_s)},
                        {"propeller", at.propeller.data()},
                        {"phase", at.step < 0 ? at.phase : std::string_view()}};
-  KPHI_JSON_MEMBERS(message, at, step, steps, occlusion_deg, repetition, repetitions);
+  KPHI_JSON_MEMBERS(message, at, step, steps, occlusion_deg, repetition, repetitions, run, runs);
   add_readings(message, tick);
   for (const double rms : tick.seen.vibration.rms) message["vibration"].push_back(rounded(rms, 4));
   message["blade_pass_hz"] = rounded(tick.seen.vibration.blade_pass_hz, 6);
@@ -98,6 +98,10 @@ Message step_message(const Position& at, const StepFigures& seen) {
 
 Message line_message(double time_s, const std::string& text) {
   return {Message::Kind::other, text_of({{"type", "line"}, {"time_s", time_s}, {"text", text}})};
+}
+
+Message ask_message(const std::string& text) {
+  return {Message::Kind::other, text_of({{"type", "ask"}, {"text", text}})};
 }
 
 Message stop_message(double time_s) { return {Message::Kind::other, text_of({{"type", "stop"}, {"time_s", time_s}})}; }

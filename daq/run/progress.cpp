@@ -3,15 +3,30 @@
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace kphi::daq {
 namespace {
 
+constexpr std::size_t kAnyWidth = 200;
+
 std::string minutes_and_seconds(double seconds) {
   const long whole = static_cast<long>(seconds + 0.5);
   if (whole >= 3600) return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
   return fmt::format("{:02}:{:02}", whole / 60, whole % 60);
+}
+
+/// Characters, not bytes: φ and ° take two.
+std::size_t width_of(const std::string& line) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(line, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+}
+
+/// "44 %": of the runs, those begun counted in part.
+std::string share_done(const Position& position) {
+  const double steps = std::max(position.steps, 1), within = std::max(position.step, 0) / steps;
+  return fmt::format("{:.0f} %", 100 * (position.run - 1 + within) / std::max(position.runs, 1));
 }
 
 std::size_t width_of(std::FILE* stream) {
@@ -40,22 +55,35 @@ std::string silence(const Observation& seen) {
 
 }  // namespace
 
-std::string describe(const Position& position, const Observation& seen) {
+std::string describe(const Position& position, const Observation& seen, std::size_t columns) {
+  const auto speed = [&](const char* format) {
+    return seen.motor_is_fresh() ? fmt::format(fmt::runtime(format), to_rpm(seen.speed())) : std::string("?");
+  };
+  const auto thrust = [&](const char* format) {
+    return seen.load_cell_is_fresh() ? fmt::format(fmt::runtime(format), seen.thrust_n) : std::string("?");
+  };
+  const std::string left = minutes_and_seconds(position.remaining_s);
   const std::string which = position.repetition < 0
                                 ? fmt::format("ref {}", -position.repetition)
                                 : fmt::format("rep {}/{}", position.repetition, position.repetitions);
-  const std::string where = fmt::format("{}  φ {:3g}°  {}", position.propeller.data(), position.occlusion_deg, which);
+  const std::string run =
+      position.run == 0 ? "" : fmt::format("run {:2}/{} {}  ", position.run, position.runs, share_done(position));
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
-  return fmt::format("{}  {}  speed {} of {:5.0f} RPM  thrust {} N  left {}", where, what,
-                     seen.motor_is_fresh() ? fmt::format("{:5.0f}", to_rpm(seen.speed())) : "    ?",
-                     to_rpm(position.commanded),
-                     seen.load_cell_is_fresh() ? fmt::format("{:6.3f}", seen.thrust_n) : "     ?",
-                     minutes_and_seconds(position.remaining_s)) +
-         silence(seen);
+  const std::string whole = fmt::format("{}{}  φ {:3g}°  {}  {}  speed {:>5} of {:5.0f} RPM  thrust {:>6} N  left {}",
+                                        run, position.propeller.data(), position.occlusion_deg, which, what,
+                                        speed("{:.0f}"), to_rpm(position.commanded), thrust("{:.3f}"), left) +
+                            silence(seen);
+  if (width_of(whole) <= columns) return whole;
+  const std::string short_run =
+      position.run == 0 ? "" : fmt::format("{}/{} {} ", position.run, position.runs, share_done(position));
+  const std::string short_what =
+      position.step < 0 ? std::string(position.phase) : fmt::format("{}/{}", position.step + 1, position.steps);
+  return fmt::format("{}φ {:g}° {} {}/{:.0f} RPM {} N {}", short_run, position.occlusion_deg, short_what,
+                     speed("{:.0f}"), to_rpm(position.commanded), thrust("{:.3f}"), left);
 }
 
-std::string describe_by_hand(const Position& position, const Observation& seen) {
+std::string describe_by_hand(const Position& position, const Observation& seen, std::size_t) {
   const auto known = [](bool is_known, const char* format, double value) {
     return is_known ? fmt::format(fmt::runtime(format), value) : std::string("?");
   };
@@ -82,12 +110,13 @@ void PrintedProgress::tick(const Position& position, const Observation& seen) {
   const auto now = std::chrono::steady_clock::now();
   if (!on_terminal_ || now < next_) return;
   next_ = now + std::chrono::milliseconds(100);
-  put(stream_, fmt::format("\r{}\x1b[K", cut(words_(position, seen), width_of(stream_) - 1)), Worth::live);
+  const std::size_t columns = width_of(stream_) - 1;
+  put(stream_, fmt::format("\r{}\x1b[K", cut(words_(position, seen, columns), columns)), Worth::live);
   drawn_ = true;
 }
 
 void PrintedProgress::step_done(const Position& position, const Observation& seen) {
-  if (!on_terminal_) put(stream_, fmt::format("{}\n", words_(position, seen)), Worth::passing);
+  if (!on_terminal_) put(stream_, fmt::format("{}\n", words_(position, seen, kAnyWidth)), Worth::passing);
 }
 
 void PrintedProgress::say(const std::string& line) { put(stream_, fmt::format("{}{}\n", clearing(), line)); }

@@ -29,6 +29,8 @@ struct Position {
   std::string_view phase;  ///< of kPhaseWords; empty in a step
   RadPerSec commanded;     ///< unsigned
   double remaining_s = 0;  ///< of the campaign, wall clock
+  int run = 0;             ///< 1-based; 0: not of a campaign
+  int runs = 0;
 
   void name(std::string_view id) noexcept { id.copy(propeller.data(), propeller.size() - 1); }
 };
@@ -45,18 +47,22 @@ class Progress {
   virtual void step_done(const Position&, const Observation&) {}
   /// A line to keep.
   virtual void say(const std::string&) {}
+  /// A person is asked this at the stand, where they see it; empty: answered.
+  virtual void asks(const std::string&) {}
 };
 
-/// "5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale values are shown as
-/// '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s".
-[[nodiscard]] std::string describe(const Position& position, const Observation& seen);
+/// "run  7/15 44 %  5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale
+/// values are shown as '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s". Where that is wider
+/// than `columns`: " 7/15 44 % φ  90° 17/40  7894/7895 RPM 1.162 N 06:12", at most 60 of them.
+[[nodiscard]] std::string describe(const Position& position, const Observation& seen, std::size_t columns = 200);
 /// " 6001 of  6000 RPM  thrust  0.612 N  torque   -8.9 mN m   48 W  shakes 0.05 N  blades 0.021 N at 300 Hz".
-[[nodiscard]] std::string describe_by_hand(const Position& position, const Observation& seen);
+[[nodiscard]] std::string describe_by_hand(const Position& position, const Observation& seen,
+                                           std::size_t columns = 200);
 
 /// On a terminal one line rewritten in place, at most ten times a second; elsewhere one line per step.
 class PrintedProgress final : public Progress {
  public:
-  using Describe = std::string(const Position& position, const Observation& seen);
+  using Describe = std::string(const Position& position, const Observation& seen, std::size_t columns);
   PrintedProgress(std::FILE* stream, bool on_terminal, Describe* words = &describe)
       : stream_(stream), on_terminal_(on_terminal), words_(words) {}
   ~PrintedProgress() override;

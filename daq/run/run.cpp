@@ -22,7 +22,7 @@ namespace {
 constexpr int kReadings = 2;  // attempts at the end; a page may be lost
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
-  const auto& [campaign, config, mounted, planned, remaining, file, steering] = order;
+  const auto& [campaign, config, mounted, planned, remaining, file, steering, run_number, runs] = order;
   results::RunHeader header;
   header.started_utc = utc_text(bench.clock(), bench.clock().now());
   // A name-based UUID: unique by campaign, config in it and time, and reproducible on the deterministic bench.

@@ -30,6 +30,8 @@ struct RunOrder {
   double remaining_bench_s = 0;  ///< of the campaign, this run included
   std::filesystem::path file;    ///< final path
   Steering* steering = nullptr;  ///< sets the speeds instead of the planned steps
+  int run = 0;                   ///< 1-based number in the campaign; 0: alone
+  int runs = 0;                  ///< of the campaign
 };
 
 }  // namespace kphi::daq

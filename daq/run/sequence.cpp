@@ -41,6 +41,8 @@ Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrde
     : bench_(bench), recorder_(recorder), guard_(guard), order_(order), progress_(progress), stop_asked_(stop_asked) {
   position_.name(order.campaign.propeller.id);
   position_.occlusion_deg = order.mounted.occlusion_deg();
+  position_.run = order.run;
+  position_.runs = order.runs;
   position_.repetition = order.planned.repetition;
   position_.repetitions = std::max(order.campaign.repetitions, order.planned.repetition);
   position_.steps = static_cast<int>(order.planned.steps.size());

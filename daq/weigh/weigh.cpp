@@ -201,7 +201,7 @@ class Procedure {
 
 results::Weighing weigh(const Weigh& order) { return Procedure(order).run(); }
 
-std::string describe_weighing(const Position& position, const Observation& seen) {
+std::string describe_weighing(const Position& position, const Observation& seen, std::size_t) {
   return fmt::format("{:>9}  {}/{}  {} N", position.phase, position.repetition, position.repetitions,
                      seen.load_cell_is_fresh() ? fmt::format("{:8.3f}", seen.thrust_n) : "       ?");
 }

@@ -34,6 +34,7 @@ struct Weigh {
 [[nodiscard]] results::Weighing weigh(const Weigh& order);
 
 /// " mass on  2/3   z   4.903 N"; the load is without its first zero.
-[[nodiscard]] std::string describe_weighing(const Position& position, const Observation& seen);
+[[nodiscard]] std::string describe_weighing(const Position& position, const Observation& seen,
+                                            std::size_t columns = 200);
 
 }  // namespace kphi::daq

@@ -7,8 +7,24 @@ const kSilent_s = 1;       // without a tick from the runner: it is waiting
 const kMostLines = 500;
 const kNear = 0.9;         // of a limit
 
+const kMostGhost = 20000;  // points of one run
+const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
+
 const state = { hello: null, limits: [], tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
-                numbersDue: false, chartsDue: false, stepsDue: false };
+                numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: '', held: {},
+                run: null, before: new Map() };
+
+/// What the lower chart can show: unit, and the value of a tick.
+const kCurves = {
+  thrust: ['Thrust', 'N', tick => tick.thrust_n, 3],
+  torque: ['Torque', 'mN m', tick => tick.torque_nm === null ? null : 1e3 * tick.torque_nm, 1],
+  power: ['Power', 'W', tick => product(tick.supply_v ?? tick.module_v, tick.supply_a ?? tick.module_a), 1],
+  current: ['Current', 'A', tick => tick.supply_a ?? tick.module_a, 2],
+  voltage: ['Voltage', 'V', tick => tick.supply_v ?? tick.module_v, 2],
+  coil: ['Coil', '°C', tick => tick.coil_degc, 1],
+};
+const kCurveNames = Object.keys(kCurves);
+const product = (a, b) => a === null || b === null || a === undefined || b === undefined ? null : a * b;
 
 // ---- numbers as text
 const fixed = (value, digits) => value === null || value === undefined ? '?'
@@ -26,7 +42,23 @@ const colour = name => getComputedStyle(document.documentElement).getPropertyVal
 const occlusionColours = () => matchMedia('(prefers-color-scheme: dark)').matches
   ? ['#4fd6a0', '#6db3ff', '#ffa04d', '#ff7ab8', '#c9a6ff', '#ffe066', '#66e0ff', '#ff8a80']
   : ['#0a7d55', '#0b62c4', '#c65a00', '#b0126f', '#6a3fc0', '#857000', '#007a99', '#a01818'];
-const common = () => ({ legend: 'never', interactionModel: {}, showLabelsOnHighlight: false, highlightCircleSize: 0,
+/// Dragging zooms, dragging with Shift moves, a double click follows the run again; what is under the pointer is read out.
+const hands = name => {
+  const known = Dygraph.defaultInteractionModel, hold = () => { state.held[name] = true; };
+  return { ...known,
+    mousemove(event, chart, context) {
+      known.mousemove && known.mousemove(event, chart, context);
+      if (context.isZooming || context.isPanning) hold();
+    },
+    mousedown(event, chart, context) { context.initializeMouseDown(event, chart, context); known.mousedown(event, chart, context); },
+    touchmove(event, chart, context) { hold(); known.touchmove(event, chart, context); },
+    dblclick() { state.held[name] = false; state.chartsDue = state.stepsDue = true; } };
+};
+const readOut = (name, words) => ({
+  highlightCallback: (event, x, points) => text(name + '_read', words(x, points.filter(point => point.yval !== null))),
+  unhighlightCallback: () => text(name + '_read', ''),
+  zoomCallback: () => { state.held[name] = true; } });
+const common = name => ({ legend: 'never', interactionModel: hands(name), showLabelsOnHighlight: false, highlightCircleSize: 0,
   gridLineColor: colour('line'), axisLineColor: colour('line'), rightGap: 12, strokeWidth: 2, animatedZooms: false,
   axisLabelFontSize: 14, xAxisHeight: 24 });
 const charts = {};
@@ -34,12 +66,19 @@ const charts = {};
 function makeCharts() {
   for (const chart of Object.values(charts)) chart.destroy();
   const empty = n => [[0, ...Array(n).fill(null)], [1, ...Array(n).fill(null)]];
-  charts.speed = new Dygraph(at('speed_chart'), empty(2), { ...common(), labels: ['t', 'commanded', 'measured'],
+  charts.speed = new Dygraph(at('speed_chart'), empty(2), { ...common('speed'),
+    ...readOut('speed', (x, points) => `${fixed(x, 1)} s: ` + points.map(p => `${p.name} ${thousands(p.yval)}`).join(', ')),
+    labels: ['t', 'commanded', 'measured'],
     colors: [colour('commanded'), colour('measured')], series: { commanded: { stepPlot: true, strokeWidth: 3 } },
     axes: { y: { axisLabelWidth: 62, axisLabelFormatter: thousands } } });
-  charts.thrust = new Dygraph(at('thrust_chart'), empty(1), { ...common(), labels: ['t', 'thrust'],
-    colors: [colour('thrust')], axes: { y: { axisLabelWidth: 62 } } });
-  charts.k = new Dygraph(at('k_chart'), empty(1), { ...common(), labels: ['x', 'k'], strokeWidth: 0, drawPoints: true,
+  charts.thrust = new Dygraph(at('thrust_chart'), empty(2), { ...common('thrust'),
+    ...readOut('thrust', (x, points) => { const [, unit, , digits] = kCurves[state.curve];
+      return `${fixed(x, 1)} s: ` + points.map(p => `${p.name === 'before' ? 'before ' : ''}${fixed(p.yval, digits)} ${unit}`).join(', '); }),
+    labels: ['t', 'before', 'now'], series: { before: { strokePattern: [6, 4], strokeWidth: 1.5 } },
+    colors: [colour('soft'), colour('thrust')], axes: { y: { axisLabelWidth: 62 } } });
+  charts.k = new Dygraph(at('k_chart'), empty(1), { ...common('k'),
+    ...readOut('k', (x, points) => points.map(p => `φ ${p.name}: ${fixed(p.yval, 4)} at ${thousands(Math.sqrt(x * 1e6) * 30 / Math.PI)} RPM`).join(', ')),
+    labels: ['x', 'k'], strokeWidth: 0, drawPoints: true,
     pointSize: 5, drawPointCallback: drawStep, axes: { y: { axisLabelWidth: 62 } } });
   state.chartsDue = state.stepsDue = true;
 }
@@ -61,17 +100,34 @@ function drawStep(chart, name, ctx, x, y, paint, size, row) {
   ctx.fill();
 }
 
+/// What the run before this one at the same φ showed as long after its start; null: nothing.
+function ghostAt(time_s) {
+  const ghost = state.run && state.before.get(state.run.occlusion_deg);
+  if (!ghost) return null;
+  const since = time_s - state.run.began_s, column = 1 + kCurveNames.indexOf(state.curve);
+  let low = 0, high = ghost.length - 1;
+  while (low < high) { const middle = (low + high) >> 1; ghost[middle][0] < since ? low = middle + 1 : high = middle; }
+  return ghost.length && Math.abs(ghost[low][0] - since) < kNearGhost_s ? ghost[low][column] : null;
+}
+
+/// Where nobody has zoomed: the newest minute, whole.
+const view = (name, dateWindow, valueRange) => state.held[name] ? {} : { dateWindow, valueRange };
+
 function drawTraces() {
   const rows = state.trace;
   if (rows.length < 2) return;
-  const last = rows[rows.length - 1][0], window_ = [rows[0][0], last];
-  let top = 1, bottom = 0;
-  for (const [, thrust] of rows) if (thrust !== null) { top = Math.max(top, thrust); bottom = Math.min(bottom, thrust); }
+  const window_ = [rows[0].t, rows[rows.length - 1].t], column = kCurveNames.indexOf(state.curve);
+  const shown = rows.map(row => [row.t, ghostAt(row.t), row.values[column] ?? null]);
+  let top = -Infinity, bottom = Infinity;
+  for (const [, before, now] of shown)
+    for (const value of [before, now]) if (value !== null) { top = Math.max(top, value); bottom = Math.min(bottom, value); }
+  if (state.curve === 'thrust') { top = Math.max(top, 1); bottom = Math.min(bottom, 0); }
+  if (!(top > -Infinity)) [bottom, top] = [0, 1];
+  const room = Math.max(0.08 * (top - bottom), 1e-3 * Math.abs(top), 1e-3);
   const speedTop = 1.06 * Math.max(state.hello.speed_max_rpm, 100);
-  charts.speed.updateOptions({ file: rows.map(([t, , commanded, measured]) => [t, commanded, measured]),
-    dateWindow: window_, valueRange: [0, speedTop] });
-  charts.thrust.updateOptions({ file: rows.map(([t, thrust]) => [t, thrust]), dateWindow: window_,
-    valueRange: [1.08 * bottom - 0.02 * top, 1.08 * top] });
+  charts.speed.updateOptions({ file: rows.map(row => [row.t, row.commanded, row.measured]), ...view('speed', window_, [0, speedTop]) });
+  charts.thrust.updateOptions({ file: shown, ...view('thrust', window_, [bottom - room, top + room]) });
+  at('ghost_key').hidden = !shown.some(([, before]) => before !== null);
 }
 
 function drawSteps() {
@@ -89,7 +145,7 @@ function drawSteps() {
   const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
   const digits = Math.max(0, Math.ceil(1 - Math.log10(high - low + 2 * room)));
   charts.k.updateOptions({ file: rows.length > 1 ? rows : [rows[0], rows[0]], labels: ['x', ...angles.map(a => a + '°')],
-    colors: paints, dateWindow: [0, 1.05 * rows[rows.length - 1][0]], valueRange: [low - room, high + room],
+    colors: paints, ...view('k', [0, 1.05 * rows[rows.length - 1][0]], [low - room, high + room]),
     axes: { y: { axisLabelWidth: 62, axisLabelFormatter: value => fixed(value, digits) } } });
   at('k_keys').replaceChildren(...angles.map((angle, i) => {
     const key = document.createElement('span');
@@ -111,6 +167,8 @@ function showNumbers() {
     turns ? `commanded ${thousands(tick.commanded_rpm)}` : 'not commanded');
   at('speed_beside').classList.toggle('off', turns && !state.ended && tick.speed_rpm !== null &&
     Math.abs(tick.speed_rpm - tick.commanded_rpm) > 0.05 * tick.commanded_rpm + 100);
+  at('run_place').hidden = !tick.runs;
+  text('run', `${tick.run}/${tick.runs}`);
   text('occlusion', fixed(tick.occlusion_deg, 0) + '°');
   text('repetition', `${tick.repetition}/${tick.repetitions}`);
   const waits = tick.silent_s > kSilent_s && !state.ended;
@@ -191,6 +249,30 @@ function addLine(time_s, words) {
   if (lines.children.length > kMostLines) lines.lastChild.remove();
 }
 
+// ---- time of day, sound, title
+const tell = () => text('clock', new Date().toLocaleTimeString([], { hour12: false }));
+setInterval(tell, 1000);
+tell();
+
+let tones = null;  // only a click may make it
+at('sound').addEventListener('click', () => {
+  tones = tones ? (tones.close(), null) : new AudioContext();
+  at('sound').setAttribute('aria-pressed', String(tones !== null));
+  text('sound', tones ? 'sound on' : 'sound off');
+  if (tones) tone(0, 660, 0.1);
+});
+function tone(after_s, hertz, seconds) {
+  const oscillator = tones.createOscillator(), gain = tones.createGain(), from = tones.currentTime + after_s;
+  oscillator.frequency.value = hertz;
+  gain.gain.value = 0.2;
+  oscillator.connect(gain).connect(tones.destination);
+  oscillator.start(from);
+  oscillator.stop(from + seconds);
+}
+function alarm() { if (tones) for (let i = 0; i < 6; ++i) tone(0.4 * i, i % 2 ? 880 : 660, 0.3); }
+
+const title = words => { document.title = `${words}${state.hello ? state.hello.name : 'kphi'} – kphi`; };
+
 // ---- stop
 function banner(kind, title, words) {
   at('banner').className = kind;
@@ -239,7 +321,8 @@ at('stop').addEventListener('click', event => { if (event.detail === 0) stop(); 
 const take = {
   hello(message) {
     Object.assign(state, { hello: message, tick: null, trace: [], steps: [], ended: false, asked: false });
-    document.title = `${message.name} – kphi`;
+    Object.assign(state, { question: '', held: {}, run: null, before: new Map() });
+    title('');
     text('name', message.name);
     text('what', message.propeller + (message.replay ? ' · replay of a recorded run' : ''));
     at('lines').replaceChildren();
@@ -248,18 +331,21 @@ const take = {
     document.body.classList.toggle('weigh', message.weighs);
     text('hold', message.weighs ? 'done ⏎' : 'hold ⏎');
     for (const heading of document.querySelectorAll('.of_cell')) heading.textContent = message.weighs ? 'Load' : 'Thrust';
+    at('curve').options[0].text = message.weighs ? 'Load [N]' : 'Thrust [N]';
     makeLimits(message.limits);
     makeCharts();
-    banner('', '', '');
+    const comes = !message.replay && !message.by_hand && !message.weighs;
+    banner('', comes ? 'Before the first run.' : '', comes ? 'The motor is locked.' : '');
     showStop();
   },
   history(message) {
-    for (const point of message.trace) addPoint(...point);
+    for (const [time_s, thrust_n, commanded_rpm, speed_rpm] of message.trace) addPoint({ time_s, thrust_n, commanded_rpm, speed_rpm });
     for (const old of message.messages) take[old.type](old);
   },
   tick(message) {
+    if (!state.tick && !state.question && !state.asked && !state.ended) banner('', '', '');
     state.tick = message;
-    if (message.silent_s < kSilent_s) addPoint(message.time_s, message.thrust_n, message.commanded_rpm, message.speed_rpm);
+    if (message.silent_s < kSilent_s) { followRun(message); addPoint(message); }
     state.numbersDue = true;
   },
   limits(message) { makeLimits(message.limits); },
@@ -267,6 +353,12 @@ const take = {
   line(message) {
     addLine(message.time_s, message.text);
     if (state.hello.weighs) banner('', message.text, '');
+  },
+  ask(message) {
+    state.question = message.text;
+    if (state.ended || state.asked || (!message.text && !state.tick)) return;
+    banner('', message.text ? 'Asked in the terminal:' : '', message.text ? `${message.text} The motor is locked.` : '');
+    title(message.text ? 'waiting – ' : '');
   },
   stop(message) {
     state.asked = true;
@@ -279,20 +371,40 @@ const take = {
     state.numbersDue = true;
     addLine(message.time_s, message.text);
     const { replay, by_hand, weighs } = state.hello;
+    title(message.well ? 'finished – ' : 'STOPPED – ');
+    if (!message.well) alarm();
     const well = replay ? 'The replay is over.' : weighs ? 'Weighed.' : by_hand ? 'The motor is at rest.' : 'Campaign finished.';
     banner(message.well || state.asked ? 'good' : 'bad', message.well ? well : state.asked ? 'Stopped as asked.' : 'The run is over.', message.well ? (weighs ? message.text : '') : message.text);
     showStop();
   },
 };
 
-function addPoint(time_s, thrust_n, commanded_rpm, speed_rpm) {
-  const trace = state.trace, last = trace.length ? trace[trace.length - 1][0] : -Infinity;
-  if (time_s <= last) return;
-  if (time_s - last > kGap_s * 30 && trace.length) trace.push([last + 1e-3, null, null, null]);
-  trace.push([time_s, thrust_n, commanded_rpm, speed_rpm]);
+/// A run that begins ends the one before: from then on that is the ghost of the next at its φ.
+function followRun(tick) {
+  const { occlusion_deg, repetition, step } = tick;
+  if (state.run && state.run.occlusion_deg === occlusion_deg && state.run.repetition === repetition) {
+    if (state.run.points.length < kMostGhost)
+      state.run.points.push([tick.time_s - state.run.began_s, ...kCurveNames.map(name => kCurves[name][2](tick) ?? null)]);
+    return;
+  }
+  if (step < 0) return;
+  if (state.run) state.before.set(state.run.occlusion_deg, state.run.points);
+  state.run = { occlusion_deg, repetition, began_s: tick.time_s, points: [] };
+}
+
+function addPoint(tick) {
+  const trace = state.trace, last = trace.length ? trace[trace.length - 1].t : -Infinity, t = tick.time_s;
+  if (t <= last) return;
+  const none = kCurveNames.map(() => null);
+  if (t - last > kGap_s * 30 && trace.length) trace.push({ t: last + 1e-3, commanded: null, measured: null, values: none });
+  trace.push({ t, commanded: tick.commanded_rpm, measured: tick.speed_rpm,
+    values: kCurveNames.map(name => kCurves[name][2](tick) ?? null) });
   if (trace.length > kPoints) trace.splice(0, trace.length - kPoints);
   state.chartsDue = true;
 }
+
+at('curve').append(...kCurveNames.map(name => new Option(`${kCurves[name][0]} [${kCurves[name][1]}]`, name)));
+at('curve').addEventListener('change', () => { state.curve = at('curve').value; state.held.thrust = false; state.chartsDue = true; });
 
 // ---- frames: numbers with every message, curves less often
 function frame(now) {

@@ -38,6 +38,27 @@ TEST(Progress, NamesPropellerOcclusionRepetitionStepSpeedsThrustAndTimeLeft) {
   EXPECT_NE(describe(position, seen()).find("left 1:02:05"), std::string::npos) << "hours when there are any";
 }
 
+TEST(Progress, BeginsWithTheRunAndTheShareOfTheCampaignThatIsDone) {
+  Position position = in_a_step();
+  position.run = 7;
+  position.runs = 15;
+  EXPECT_THAT(describe(position, seen()), testing::StartsWith("run  7/15 43 %  5x3  φ  90°  rep 2/3  step 17/40  "));
+}
+
+TEST(Progress, FitsSixtyColumnsWithThrustAndTimeLeft) {
+  Position position = in_a_step();
+  position.run = position.runs = 15;
+  position.occlusion_deg = 22.5;
+  position.commanded = from_rpm(19100);
+  position.remaining_s = 36'000;
+  const std::string narrow = describe(position, seen(), 60);
+  EXPECT_EQ(narrow, "15/15 96 % φ 22.5° 17/40 7894/19100 RPM 1.162 N 10:00:00");
+  EXPECT_LE(narrow.size(), 60u + 2) << "φ and ° take two bytes";
+  position.step = -1;
+  position.phase = "spin down";
+  EXPECT_EQ(describe(position, seen(), 60), "15/15 93 % φ 22.5° spin down 7894/19100 RPM 1.162 N 10:00:00");
+}
+
 TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
   const std::string begin = "5x3  φ  90°  rep 2/3  step 17/40  speed  ";
   Observation observation = seen();

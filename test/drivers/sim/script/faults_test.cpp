@@ -94,7 +94,7 @@ TEST(FaultFile, ReadsEveryKind) {
 }
 
 std::string readme() {
-  std::ifstream file(kphi::test::source_dir() + "/README.md");
+  std::ifstream file(kphi::test::source_dir() + "/drivers/sim/README.md");
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
