@@ -100,6 +100,11 @@ async function stopBy(how, ask, page, bench, run) {
   assert.match(await page.locator('#banner').innerText(), /stopped by request/);
   assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
   await page.waitForFunction(() => document.getElementById('speed').textContent === '–');
+  assert.match(await page.title(), /^STOPPED – browser/);
+  await page.waitForFunction(() => document.getElementById('link').textContent === 'over');
+  assert.ok(await page.evaluate(() => state.trace.length > 5), 'it keeps what it has');
+  const reason = await page.evaluate(() => [at('banner').scrollHeight, at('banner').clientHeight]);
+  assert.ok(reason[0] <= reason[1] + 1, `the reason is cut: ${reason}`);
   await page.screenshot({ path: path.join(pictures, `live_view_stopped_by_${how}.png`) });
   const stages = await bench.stages();
   assert.equal(stages.filter(([at]) => at <= asked).at(-1)?.[1], 'drive', `it turned at the ${how}`);
@@ -202,6 +207,50 @@ try {
     assert.deepEqual(cut, [], 'words that do not fit');
   });
 
+  await it('says what is asked in the terminal, and that the motor is locked', async () => {
+    await page.evaluate(() => take.ask({ text: 'Mount 45°, then type 45.' }));
+    assert.equal(await page.locator('#banner').innerText(), 'Asked in the terminal: Mount 45°, then type 45. The motor is locked.');
+    assert.match(await page.title(), /^waiting – /);
+    await page.evaluate(() => take.ask({ text: '' }));
+    assert.equal(await page.locator('#banner').isHidden(), true);
+    assert.match(await page.locator('#run').innerText(), /^\d+\/20$/);
+    assert.match(await page.locator('#clock').innerText(), /^\d\d:\d\d:\d\d$/);
+  });
+
+  await it('lets a person zoom, read a value, choose a curve, and compare with the repetition before', async () => {
+    await turns(page, run, 3);
+    await page.waitForFunction(() => !at('ghost_key').hidden);
+    const { x, y, width, height } = await page.locator('#thrust_chart').boundingBox();
+    await page.mouse.move(x + 0.5 * width, y + 0.5 * height);
+    await page.mouse.move(x + 0.6 * width, y + 0.5 * height);
+    await page.waitForFunction(() => / s: .* N/.test(at('thrust_read').textContent));
+    await page.mouse.down();
+    await page.mouse.move(x + 0.9 * width, y + 0.5 * height, { steps: 5 });
+    await page.mouse.up();
+    const zoomed = await page.evaluate(() => [state.held.thrust, charts.thrust.xAxisRange(), window.seen.ticks.length]);
+    assert.equal(zoomed[0], true);
+    await page.waitForFunction(ticks => window.seen.ticks.length > ticks + 20, zoomed[2]);
+    assert.deepEqual(await page.evaluate(() => charts.thrust.xAxisRange()), zoomed[1], 'what is zoomed stays');
+    await page.mouse.dblclick(x + 0.5 * width, y + 0.5 * height);
+    await page.waitForFunction(range => charts.thrust.xAxisRange()[1] > range[1], zoomed[1]);
+    for (const curve of ['torque', 'power', 'current', 'voltage', 'coil']) {
+      await page.selectOption('#curve', curve);
+      await page.waitForFunction(() => charts.thrust.yAxisRange()[1] > charts.thrust.yAxisRange()[0]
+        && state.trace.at(-1).values[kCurveNames.indexOf(state.curve)] !== null);
+    }
+    await page.selectOption('#curve', 'thrust');
+  });
+
+  await it('fits a telephone', async () => {
+    const phone = await open(browser, url, { viewport: { width: 390, height: 844 } });
+    await phone.waitForFunction(() => state.trace.length > 20);
+    const cut = await phone.evaluate(() => [document.documentElement.scrollWidth, ...[...document.querySelectorAll('#where b, #where span, .number, header *')]
+      .filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1 && getComputedStyle(node).display !== 'inline').map(node => node.textContent)]);
+    assert.deepEqual(cut, [390]);
+    await phone.screenshot({ path: path.join(pictures, 'live_view_phone.png'), fullPage: true });
+    await phone.close();
+  });
+
   await it(`coasts the motor within ${kPrompt_ms} ms of a key`, async () => {
     await turns(page, run, 2);
     await page.screenshot({ path: path.join(pictures, 'live_view.png') });  // which may outlast the repetition
@@ -240,7 +289,7 @@ try {
     assert.ok(asked.length >= 6);
     assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
   });
-  console.log(`${results.length} of 8 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
+  console.log(`${results.length} of 11 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
 } finally {
   await browser?.close();
   for (const each of [bench, other]) each?.clear();
