@@ -16,6 +16,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
 #include <deque>
+#include <list>
 #include <set>
 #include <thread>
 
@@ -127,7 +128,7 @@ struct Server::Impl {
 
   Settings settings_;
   Feed& feed_;
-  std::size_t requests_ = 0;  // before the context, whose end destroys requests
+  std::list<Request*> requests_;  // oldest first; before the context, whose end destroys requests
   asio::io_context io_{1};
   tcp::acceptor acceptor_{io_};
   asio::steady_timer frames_due_{io_}, closing_limit_{io_};
@@ -252,8 +253,15 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
 /// One request: answered, or passed on to a Client.
 class Server::Impl::Request : public std::enable_shared_from_this<Request> {
  public:
-  Request(Impl& impl, tcp::socket socket) : impl_(impl), stream_(std::move(socket)) { ++impl_.requests_; }
-  ~Request() { --impl_.requests_; }
+  Request(Impl& impl, tcp::socket socket)
+      : impl_(impl), stream_(std::move(socket)), place_(impl.requests_.insert(impl.requests_.end(), this)) {}
+  ~Request() { impl_.requests_.erase(place_); }
+
+  /// For a newer one: what is half open does not keep others out.
+  void give_way() {
+    impl_.requests_.splice(impl_.requests_.end(), impl_.requests_, place_);
+    stream_.close();
+  }
 
   void read() {
     parser_.header_limit(kLongestHeader);
@@ -264,7 +272,9 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
         return self->answer(431, "the request is too long");
       if (failed == http::error::unexpected_body || failed == http::error::body_limit)
         return self->answer(400, "requests must not have a body");
-      if (failed == beast::error::timeout || failed == http::error::end_of_stream) return;
+      if (failed == beast::error::timeout || failed == http::error::end_of_stream ||
+          failed == asio::error::operation_aborted)
+        return;
       if (failed) return self->answer(400, "not an HTTP request");
       self->judge();
     });
@@ -342,6 +352,7 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
 
   Impl& impl_;
   beast::tcp_stream stream_;
+  std::list<Request*>::iterator place_;
   beast::flat_buffer buffer_{2 * kLongestHeader};
   http::request_parser<http::empty_body> parser_;
   http::response<http::string_body> answer_;
@@ -352,8 +363,8 @@ class Server::Impl::Request : public std::enable_shared_from_this<Request> {
 void Server::Impl::accept() {
   acceptor_.async_accept([this](Error failed, tcp::socket socket) {
     if (failed == asio::error::operation_aborted) return;
-    // Beyond the limit the connection is closed unread.
-    if (!failed && requests_ < kMostRequests) std::make_shared<Request>(*this, std::move(socket))->read();
+    if (requests_.size() >= kMostRequests) requests_.front()->give_way();
+    if (!failed) std::make_shared<Request>(*this, std::move(socket))->read();
     accept();
   });
 }

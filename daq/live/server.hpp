@@ -30,7 +30,7 @@ class Server {
   };
   static constexpr std::size_t kLongestWord = 64;      ///< message from a page, bytes
   static constexpr std::size_t kLongestHeader = 8192;  ///< header of a request, bytes
-  static constexpr std::size_t kMostRequests = 64;     ///< under way at once; further connections are closed unread
+  static constexpr std::size_t kMostRequests = 64;     ///< under way at once; one more closes the oldest
 
   /// Listens at once. Throws ConfigurationError if the port is taken. `feed` must outlive this.
   Server(Settings settings, Feed& feed);
