@@ -1,0 +1,142 @@
+// What may be asked of campaigns that lie in a folder: list, info, pack.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zip.h>
+
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "results/digest.hpp"
+#include "test/compensation/flight/bench_coefficients.hpp"
+#include "test/daq/bench_fixture.hpp"
+
+namespace kphi::test {
+namespace campaigns_test {
+
+using testing::AllOf;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+/// One campaign, measured and fitted once for all tests here.
+class Campaigns : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    parent_ = new TemporaryFolder();
+    std::ofstream(*parent_ / "campaign.yaml") << short_campaign_text("0, 45, 90, 180, 270", 1);
+    std::ofstream(*parent_ / "bench.yaml") << deterministic_config(1).text;
+    campaign_ =
+        fs::path(bench_coefficients(*parent_ / "campaign.yaml", *parent_ / "bench.yaml", *parent_)).parent_path();
+  }
+  static void TearDownTestSuite() {
+    delete parent_;
+    parent_ = nullptr;
+  }
+  struct Answer {
+    int code;
+    std::string out, err;
+  };
+  static Answer say(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), KPHI_PROGRAM);
+    Process process(arguments);
+    const int code = process.wait();
+    return {code, process.out(), process.err()};
+  }
+
+  static TemporaryFolder* parent_;
+  static fs::path campaign_;
+};
+TemporaryFolder* Campaigns::parent_ = nullptr;
+fs::path Campaigns::campaign_;
+
+TEST_F(Campaigns, AreListedWithDatePropellerCoefficientAndVerdict) {
+  const Answer list = say({"list", campaign_.parent_path().string()});
+  EXPECT_EQ(list.code, 0) << list.err;
+  EXPECT_THAT(list.out,
+              ContainsRegex("2021-05-30 00:00 +5x3 +5 of 5 +1\\.[0-9]+e-06 ± [0-9.e-]+ +fly with care +2021"));
+  const auto told = nlohmann::json::parse(say({"list", campaign_.parent_path().string(), "--json"}).out);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0]["runs"], 5);
+  EXPECT_EQ(told[0]["verdict"], "fly with care");
+  EXPECT_NEAR(told[0]["K_T"].get<double>(), 1.55e-6, 0.03e-6);
+}
+
+TEST_F(Campaigns, SayWhatTheyAreAndWhatComesNext) {
+  const Answer info = say({"info", campaign_.string()});
+  EXPECT_EQ(info.code, 0) << info.err;
+  EXPECT_THAT(info.out, AllOf(HasSubstr("measured    2021-05-30T00:00:00Z"), HasSubstr("runs        5 of 5"),
+                              HasSubstr("verdict     fly with care")));
+  const TemporaryFolder copy;
+  fs::copy(campaign_, copy.path() / "c", fs::copy_options::recursive);
+  for (const char* name : {"coefficients.yaml", "SHA256SUMS"}) fs::remove(copy.path() / "c" / name);
+  const std::string folder = (copy.path() / "c").string();
+  EXPECT_THAT(say({"info", folder}).out,
+              AllOf(HasSubstr("K_T         not fitted"), HasSubstr("next        kphi fit " + folder)));
+  std::ofstream(copy.path() / "c/journal.jsonl", std::ios::app) << "{}\n";
+  EXPECT_THAT(say({"info", folder}).out, HasSubstr("next        kphi verify " + folder));
+}
+
+/// Name → bytes of every file in it.
+std::map<std::string, std::string> contents_of(const fs::path& file) {
+  std::map<std::string, std::string> contents;
+  int code = 0;
+  zip_t* zip = zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code);
+  EXPECT_NE(zip, nullptr) << code;
+  for (zip_int64_t i = 0; zip != nullptr && i < zip_get_num_entries(zip, 0); ++i) {
+    zip_stat_t about;
+    zip_stat_index(zip, static_cast<zip_uint64_t>(i), 0, &about);
+    std::string bytes(about.size, '\0');
+    zip_file_t* one = zip_fopen_index(zip, static_cast<zip_uint64_t>(i), 0);
+    EXPECT_EQ(zip_fread(one, bytes.data(), bytes.size()), static_cast<zip_int64_t>(bytes.size()));
+    zip_fclose(one);
+    contents[about.name] = bytes;
+  }
+  if (zip != nullptr) zip_discard(zip);
+  return contents;
+}
+
+TEST_F(Campaigns, ArePackedWholeWithChecksumsAndTheWordsOfAnArchive) {
+  const TemporaryFolder out;
+  const std::string file = (out.path() / "c.zip").string();
+  const Answer pack =
+      say({"pack", campaign_.string(), "--out", file, "--license", "CC-BY-4.0", "--creator", "A. Name"});
+  ASSERT_EQ(pack.code, 0) << pack.err;
+  auto contents = contents_of(file);
+  const std::string root = campaign_.filename().string() + "/";
+  std::istringstream sums(contents[root + "checksums.sha256"]);
+  std::size_t checked = 0;
+  for (std::string sum, name; sums >> sum >> name; ++checked)
+    EXPECT_EQ(results::sha256(contents[root + name]), sum) << name;
+  EXPECT_EQ(checked + 3, contents.size());
+  EXPECT_EQ(contents.count(root + "runs/5x3_phi090_rep1.h5"), 1u);
+  const auto crate = nlohmann::json::parse(contents[root + "ro-crate-metadata.json"]);
+  EXPECT_EQ(crate["@context"], "https://w3id.org/ro/crate/1.2/context");
+  std::map<std::string, nlohmann::json> entities;
+  for (const auto& one : crate["@graph"]) entities[one["@id"]] = one;
+  EXPECT_EQ(entities["ro-crate-metadata.json"]["about"]["@id"], "./");
+  for (const char* key : {"name", "description", "datePublished", "license", "hasPart"})
+    EXPECT_TRUE(entities["./"].contains(key)) << key;
+  for (const auto& part : entities["./"]["hasPart"]) EXPECT_TRUE(entities.contains(part["@id"])) << part;
+  EXPECT_EQ(entities["#licence"]["name"], "CC-BY-4.0");
+  EXPECT_EQ(entities["#creator"]["name"], "A. Name");
+  EXPECT_THAT(contents[root + "README.md"], HasSubstr("fly with care"));
+  EXPECT_EQ(say({"pack", campaign_.string(), "--out", file}).code, 2) << "never over another file";
+}
+
+TEST_F(Campaigns, AreNotPackedWithDamage) {
+  const TemporaryFolder copy;
+  fs::copy(campaign_, copy.path() / "c", fs::copy_options::recursive);
+  const fs::path steps = copy.path() / "c/steps.csv";
+  fs::permissions(steps, fs::perms::owner_write, fs::perm_options::add);
+  std::ofstream(steps, std::ios::app) << "5x3\n";
+  const std::string file = (copy.path() / "c.zip").string();
+  const Answer pack = say({"pack", (copy.path() / "c").string(), "--out", file});
+  EXPECT_EQ(pack.code, 5) << pack.err;
+  EXPECT_THAT(pack.err, HasSubstr("what is damaged is not packed"));
+  EXPECT_FALSE(fs::exists(file));
+}
+
+}  // namespace campaigns_test
+}  // namespace kphi::test
