@@ -98,8 +98,11 @@ FitInput campaign_input(const fs::path& path) {
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
   const std::string load_cell = take_runs(folder, input.provenance);
+  if (fs::exists(folder.campaign_file()))
+    input.provenance.operator_name = profiles::load_campaign(folder.campaign_file().string()).operator_name;
   if (fs::exists(folder.bench_file())) {
     const profiles::BenchConfig bench = profiles::load_bench(folder.bench_file().string());
+    input.provenance.stand = bench.name;
     const auto& gain = bench.iq.clock_gain;
     input.provenance.clock = gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
     take_weighing(path, bench, load_cell, input);

@@ -48,6 +48,7 @@ struct Provenance {
   std::vector<RejectedRun> rejected{};
   std::string cell_weighed{};  ///< one line: when, with what, and what it said of the load cell; empty: it was not
   std::optional<BenchUncertainty> bench{};  ///< of the budget
+  std::string stand{}, operator_name{};     ///< of a campaign: names of bench file and person; empty: unknown
 };
 
 /// The estimator in words; the same in file and report.

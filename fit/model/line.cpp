@@ -113,7 +113,8 @@ class LineModel final : public CurveModel {
     }
     const double clipping = *line.clipping_deg(), zero = *line.zero_crossing_deg();
     if (clipping > 0)
-      remarks.push_back(fmt::format("up to {:.1f}° the line is above K_T, so k_i is held at 1", clipping));
+      remarks.push_back(fmt::format(
+          "up to {:.1f}° the line is above K_T, so k_i is held at 1: no occlusion gives more thrust", clipping));
     if (clipping < 0)
       remarks.push_back(
           fmt::format("at first contact the line is already {:.2f} % below K_T, so k_i steps there", -share));

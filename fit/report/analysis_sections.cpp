@@ -212,8 +212,11 @@ std::string standard_section(const Fitted& fitted) {
 
 std::string analysis_sections(const Analysis& analysis) {
   return rejected_section(analysis.rejected) + budget_section(analysis.coefficients, analysis.standard) +
-         prediction_section(analysis.predictions) + speed_section(analysis.speed) + test_section(analysis) +
-         torque_section(analysis.torque);
+         prediction_section(analysis.predictions) + speed_section(analysis.speed);
+}
+
+std::string analysis_appendix(const Analysis& analysis) {
+  return test_section(analysis) + torque_section(analysis.torque);
 }
 
 }  // namespace kphi::fit

@@ -16,7 +16,9 @@ namespace kphi::fit {
 /// k in air of 1.225 kg/m³, or that the density is unknown.
 [[nodiscard]] std::string standard_section(const Fitted& fitted);
 
-/// Rejected points, budget, predictions, k against speed, tests, torque.
+/// Rejected points, budget, predictions, k against speed.
 [[nodiscard]] std::string analysis_sections(const Analysis& analysis);
+/// Tests, torque.
+[[nodiscard]] std::string analysis_appendix(const Analysis& analysis);
 
 }  // namespace kphi::fit

@@ -139,14 +139,20 @@ std::string provenance_section(const Identification& identification, const Prove
   if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
   html += entry("Measured", known(provenance.measured_utc));
   html += entry("Fitted by", "kphi " + provenance.tool_version);
-  return html + "</dl>\n" + hash_section(provenance.runs);
+  if (!provenance.stand.empty()) html += entry("Bench", provenance.stand);
+  if (!provenance.operator_name.empty()) html += entry("Operator", provenance.operator_name);
+  return html + "</dl>\n";
 }
 
 }  // namespace
 
 std::string campaign_sections(const Identification& identification, const Provenance& provenance) {
+  return provenance_section(identification, provenance);
+}
+
+std::string campaign_appendix(const Identification& identification, const Provenance& provenance) {
   return power_section(identification) + step_section(identification.selection) +
-         run_section(provenance, identification.selection) + provenance_section(identification, provenance);
+         run_section(provenance, identification.selection) + hash_section(provenance.runs);
 }
 
 }  // namespace kphi::fit

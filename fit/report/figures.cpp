@@ -182,15 +182,16 @@ Figure thrust_figure(const Identification& identification) {
 
 /// T/ω² of each level against the k of the range, in percent.
 Figure speed_figure(const Identification& identification) {
-  Figure figure{"k_over_speed",
-                "k at each speed relative to the k fitted over all of them (mean and standard error of the "
-                "repetitions). Flat lines support T = k ω²; a slope means that k depends on speed.",
-                {},
-                "phi_deg,speed_rpm,k_n_s2_per_rad2,standard_error,percent_of_fitted\n"};
-  std::string data;
-  Curves curves;
+  Figure figure{
+      "k_over_speed",
+      "k at each speed relative to the k fitted over all of them, a panel for each occlusion (mean and standard "
+      "error of the repetitions). Flat lines support T = k ω²; a slope means that k depends on speed.",
+      {},
+      "phi_deg,speed_rpm,k_n_s2_per_rad2,standard_error,percent_of_fitted\n"};
+  std::string data, panels;
   std::vector<double> deviations;
-  for (std::size_t i = 0; i < identification.table.size(); ++i) {
+  const std::size_t last = identification.table.size() - 1;
+  for (std::size_t i = 0; i <= last; ++i) {
     const OcclusionCoefficient& row = identification.table[i];
     std::map<double, std::vector<Point>> levels;  // by commanded speed
     for (const results::StepMean& step : row.measured)
@@ -205,14 +206,21 @@ Figure speed_figure(const Identification& identification) {
     }
     const auto [colour, shape] = mark(i);
     data += data_block(fmt::format("k{}", i), rows);
-    curves.push_back(fmt::format("$k{} using 1:2:3 with yerrorbars pt {} ps 0.5 lw 0.8 lc rgb '{}' title 'φ = {}°'", i,
-                                 shape, colour, cell(row.phi_deg)));
-    curves.push_back(fmt::format("$k{} using 1:2 with lines lw 1 lc rgb '{}' notitle", i, colour));
+    panels +=
+        fmt::format("{}{}set label 1 'φ = {}°' at graph 0.985, graph 0.86 right tc rgb '{}'\n",
+                    i > 0 ? "unset label 2\n" : "", i == last ? "set format x '%g'\nset xlabel 'speed, RPM'\n" : "",
+                    cell(row.phi_deg), colour) +
+        plot({"0 with lines lw 0.6 lc rgb '#999999' notitle",
+              fmt::format("$k{} using 1:2:3 with yerrorbars pt {} ps 0.5 lw 0.8 lc rgb '{}' notitle", i, shape, colour),
+              fmt::format("$k{} using 1:2 with lines lw 1 lc rgb '{}' notitle", i, colour)});
   }
   figure.script = figure_head() + data + symmetric_axis(axis_reach(deviations, 1)) +
-                  "set xlabel 'speed, RPM'\nset ylabel 'k at one speed relative to k of the range, %'\n"
-                  "set key bottom right horizontal samplen 1 spacing 1.2\n" +
-                  plot(curves);
+                  fmt::format("set format x ''\nset ytics {0:.6g},{1:.6g},{1:.6g}\n", -axis_reach(deviations, 1) / 2,
+                              axis_reach(deviations, 1) / 2) +
+                  "set label 2 'k at one speed relative to k of the range, %' at screen 0.018, "
+                  "screen 0.5 center rotate by 90\n" +
+                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.12,0.97 spacing 0.02\n", last + 1) +
+                  panels + "unset multiplot\n";
   return figure;
 }
 

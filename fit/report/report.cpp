@@ -96,6 +96,9 @@ std::string propeller_line(const Identification& identification, const Provenanc
     text += " · " + provenance.propeller_name;
   if (identification.diameter_in > 0) text += fmt::format(" · {:g} inch", identification.diameter_in);
   if (identification.blades > 0) text += fmt::format(" · {} blades", identification.blades);
+  if (provenance.measured_utc.size() >= 10) text += " · measured " + provenance.measured_utc.substr(0, 10);
+  if (!provenance.stand.empty()) text += " · bench " + provenance.stand;
+  if (!provenance.operator_name.empty()) text += " · by " + provenance.operator_name;
   return html_escaped(text);
 }
 
@@ -115,15 +118,21 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number) {
   const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
   return verdict_box(analysis.flight) + lead(identification) + headline(fitted) + first + skipped_note(figures) +
          remark_section(analysis.remarks) + coefficient_section(fitted) + standard_section(fitted) +
-         (details.empty() ? "" : html_heading("How well the model holds") + details) + analysis_sections(analysis) +
-         campaign_sections(identification, provenance);
+         (details.empty()
+              ? ""
+              : html_heading("How well the model holds") + "<div class=\"figures\">\n" + details + "</div>\n") +
+         analysis_sections(analysis) + campaign_sections(identification, provenance) +
+         "<details class=\"appendix\"><summary>Appendix: tests, torque, power, steps left out, runs and their "
+         "hashes</summary>\n" +
+         analysis_appendix(analysis) + campaign_appendix(identification, provenance) + "</details>\n";
 }
 
 }  // namespace
 
 std::string format_report(const Fitted& fitted, const Chapter& chapter) {
   int number = 0;
-  return page_head("k(φ) of " + html_escaped(fitted.identification.propeller), "How an occlusion costs thrust: k(φ)",
+  const std::string name = html_escaped(fitted.identification.propeller);
+  return page_head("k(φ) of " + name, name + ": how an occlusion costs thrust",
                    propeller_line(fitted.identification, chapter.provenance)) +
          body(fitted, chapter, number) + kPageEnd;
 }
