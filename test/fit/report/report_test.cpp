@@ -285,7 +285,7 @@ TEST(AnalysisSections, TellHowSureStandardAirIsWhereTheAirIsKnown) {
 TEST(AnalysisSections, ShowTestsWithTheirP_AndLeaveTheVerdictToTheTopOfThePage) {
   Analysis found = analysis();
   found.curvature.lack_of_fit = {"line <bent>", "k is a line", "F", 99, 2, 10, 1e-7};
-  const std::string html = analysis_sections(found);
+  const std::string html = analysis_appendix(found);
   (void)parsed("<div>" + html + "</div>");
   expect_words(html, {"line &lt;bent&gt;", "&lt; 0.0001"});
   EXPECT_THAT(html, Not(HasSubstr("rejected")));
