@@ -67,7 +67,7 @@ std::string describe(const Position& position, const Observation& seen, std::siz
                                 ? fmt::format("ref {}", -position.repetition)
                                 : fmt::format("rep {}/{}", position.repetition, position.repetitions);
   const std::string run =
-      position.run == 0 ? "" : fmt::format("run {:2}/{} {}  ", position.run, position.runs, share_done(position));
+      position.run == 0 ? "" : fmt::format("{:2}/{} {}  ", position.run, position.runs, share_done(position));
   const std::string what = position.step < 0 ? fmt::format("{:<10}", position.phase)
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
   const std::string whole = fmt::format("{}{}  φ {:3g}°  {}  {}  speed {:>5} of {:5.0f} RPM  thrust {:>6} N  left {}",

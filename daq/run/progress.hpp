@@ -51,7 +51,7 @@ class Progress {
   virtual void asks(const std::string&) {}
 };
 
-/// "run  7/15 44 %  5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale
+/// " 7/15 44 %  5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale
 /// values are shown as '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s". Where that is wider
 /// than `columns`: " 7/15 44 % φ  90° 17/40  7894/7895 RPM 1.162 N 06:12", at most 60 of them.
 [[nodiscard]] std::string describe(const Position& position, const Observation& seen, std::size_t columns = 200);

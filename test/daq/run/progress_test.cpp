@@ -42,7 +42,7 @@ TEST(Progress, BeginsWithTheRunAndTheShareOfTheCampaignThatIsDone) {
   Position position = in_a_step();
   position.run = 7;
   position.runs = 15;
-  EXPECT_THAT(describe(position, seen()), testing::StartsWith("run  7/15 43 %  5x3  φ  90°  rep 2/3  step 17/40  "));
+  EXPECT_THAT(describe(position, seen()), testing::StartsWith(" 7/15 43 %  5x3  φ  90°  rep 2/3  step 17/40  "));
 }
 
 TEST(Progress, FitsSixtyColumnsWithThrustAndTimeLeft) {
