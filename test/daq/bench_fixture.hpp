@@ -117,12 +117,13 @@ class SaidLines final : public daq::Progress {
     lines.push_back(line);
     if (then) then(line);
   }
+  void asks(const std::string& question) override { questions.push_back(question); }
   /// Lines with these words.
   [[nodiscard]] std::ptrdiff_t count(const std::string& words) const {
     return std::count_if(lines.begin(), lines.end(),
                          [&](const std::string& line) { return line.find(words) != std::string::npos; });
   }
-  std::vector<std::string> lines;
+  std::vector<std::string> lines, questions;
   std::function<void(const std::string&)> then;
   std::function<void(const daq::Position&, const daq::Observation&)> at_tick;
 };

@@ -24,6 +24,17 @@ TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
                                        "repetitions_judged", "campaign_finished"));
 }
 
+TEST_F(ShortCampaign, TellsWhatIsAskedAndThatItIsAnswered) {
+  (void)run(test::short_campaign("0, 90", 1, 3));
+  EXPECT_THAT(said_.questions, ElementsAre("Take the occlusion off, then type 0.", "", "Mount 90°, then type 90.", ""));
+}
+
+TEST_F(ShortCampaign, LeavesNoQuestionOpenWhenAMountingIsRefused) {
+  person_.refuse_at_deg = 90;
+  EXPECT_THROW((void)run(test::short_campaign("0, 90", 1, 3)), NotMounted);
+  EXPECT_THAT(said_.questions, ElementsAre("Take the occlusion off, then type 0.", "", "Mount 90°, then type 90.", ""));
+}
+
 TEST_F(ShortCampaign, LeavesAWholeFolderWhoseStepsAreAPureFunctionOfTheRuns) {
   (void)run(test::short_campaign("0, 90", 1, 3));
   expect_whole();

@@ -22,9 +22,10 @@ class Told final : public Progress {
   void tick(const Position&, const Observation&) override { ++ticks; }
   void step_done(const Position&, const Observation&) override { ++steps; }
   void say(const std::string& line) override { lines.push_back(line); }
+  void asks(const std::string& question) override { questions.push_back(question); }
   int ticks = 0, steps = 0;
   std::size_t limits = 0;
-  std::vector<std::string> lines;
+  std::vector<std::string> lines, questions;
 };
 
 class LiveProgressOf : public testing::Test {
@@ -67,6 +68,16 @@ TEST_F(LiveProgressOf, TellsTheTerminalAllTheSameAndPassesOnWhatIsSaid) {
   progress_.step_done(position_, seen_);
   EXPECT_EQ(told_.ticks, 5);
   EXPECT_EQ(told_.steps, 1);
+}
+
+TEST_F(LiveProgressOf, PassesOnWhatAPersonIsAsked) {
+  progress_.asks("Mount 45°, then type 45.");
+  progress_.asks("");
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_EQ(told[0], json({{"type", "ask"}, {"text", "Mount 45°, then type 45."}}));
+  EXPECT_EQ(told[1], json({{"type", "ask"}, {"text", ""}}));
+  EXPECT_THAT(told_.questions, ElementsAre("Mount 45°, then type 45.", ""));
 }
 
 TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
