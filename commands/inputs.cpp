@@ -261,7 +261,7 @@ void write_output(const fs::path& path, const std::string& text) {
   std::error_code none;
   if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder, none))
     throw ConfigurationError(
-        fmt::format("{}: there is no folder {}; make it first, or choose another", path.string(), folder.string()));
+        fmt::format("{}: the folder {} does not exist; create it, or choose another", path.string(), folder.string()));
   if (fs::is_directory(path, none)) throw ConfigurationError(path.string() + ": is a folder; name a file in it");
   results::MemoryOnlySync files;
   results::write_text(path, text, files);

@@ -135,7 +135,7 @@ class ThrustCurve {
       : thrust_coefficient_(thrust_coefficient), line_(line), largest_fitted_(largest_fitted), overlap_(overlap) {}
 
   ThrustCoefficient thrust_coefficient_;
-  Line line_;             // where there is no table
+  Line line_;             // counts if table_ is empty
   OcclusionTable table_;  // of k
   OcclusionTable torque_share_;
   SpeedTrend speed_trend_;

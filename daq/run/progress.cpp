@@ -9,8 +9,6 @@
 namespace kphi::daq {
 namespace {
 
-constexpr std::size_t kAnyWidth = 200;
-
 std::string minutes_and_seconds(double seconds) {
   const long whole = static_cast<long>(seconds + 0.5);
   if (whole >= 3600) return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);

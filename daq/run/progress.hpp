@@ -51,13 +51,15 @@ class Progress {
   virtual void asks(const std::string&) {}
 };
 
+inline constexpr std::size_t kAnyWidth = 200;  ///< columns of a line that need not fit
+
 /// " 7/15 44 %  5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale
 /// values are shown as '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s". Where that is wider
 /// than `columns`: " 7/15 44 % φ  90° 17/40  7894/7895 RPM 1.162 N 06:12", at most 60 of them.
-[[nodiscard]] std::string describe(const Position& position, const Observation& seen, std::size_t columns = 200);
+[[nodiscard]] std::string describe(const Position& position, const Observation& seen, std::size_t columns = kAnyWidth);
 /// " 6001 of  6000 RPM  thrust  0.612 N  torque   -8.9 mN m   48 W  shakes 0.05 N  blades 0.021 N at 300 Hz".
 [[nodiscard]] std::string describe_by_hand(const Position& position, const Observation& seen,
-                                           std::size_t columns = 200);
+                                           std::size_t columns = kAnyWidth);
 
 /// On a terminal one line rewritten in place, at most ten times a second; elsewhere one line per step.
 class PrintedProgress final : public Progress {

@@ -35,6 +35,6 @@ struct Weigh {
 
 /// " mass on  2/3   z   4.903 N"; the load is without its first zero.
 [[nodiscard]] std::string describe_weighing(const Position& position, const Observation& seen,
-                                            std::size_t columns = 200);
+                                            std::size_t columns = kAnyWidth);
 
 }  // namespace kphi::daq

@@ -57,7 +57,7 @@ std::optional<SpeedTrend> speed_trend(const Identification& identification, std:
   const double beyond = count > 1 ? std::max(1.0, squares / (count - 1)) : 1;  // Birge's ratio, squared
   trend.per_rad_s.u = std::sqrt(beyond / weight);
   trend.per_rad_s.freedom = std::max(1.0, freedom);
-  // More than the library flies is no trend of a propeller.
+  // The library refuses a larger trend: no propeller has one.
   if (std::abs(trend.per_rad_s.value * trend.reference_rad_s) > compensation::SpeedTrend::kMost) return std::nullopt;
   return student_test(trend.per_rad_s, 0).rejected() ? std::optional(trend) : std::nullopt;
 }

@@ -123,7 +123,7 @@ TEST_F(FirstSteps, AnOutputThatCannotBeIsRefusedBeforeAnythingHappens) {
   EXPECT_THAT(run.err, HasSubstr("afile is not writable; choose another folder with --out"));
   const Answer sim = say("sim bench.yaml --truth nofolder/truth.yaml");
   EXPECT_EQ(sim.code, 2);
-  EXPECT_THAT(sim.err, HasSubstr("there is no folder nofolder"));
+  EXPECT_THAT(sim.err, HasSubstr("the folder nofolder does not exist"));
 }
 
 TEST_F(FirstSteps, EveryVerbEndsItsHelpWithAnExampleOfItsOwn) {

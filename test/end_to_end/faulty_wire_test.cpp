@@ -110,7 +110,7 @@ TEST(BadScript, OrATruthLogThatCannotBeWrittenIsNamedBeforeTheSimulatorStarts) {
   refused("--faults", folder / "none.yaml", 2,
           "none.yaml: cannot be opened: No such file or directory; check the name");
   refused("--faults", folder.path(), 2, "is a folder; name a file");
-  refused("--truth-log", folder / "no/such/log.jsonl", 2, "no/such/log.jsonl: there is no folder");
+  refused("--truth-log", folder / "no/such/log.jsonl", 2, "no/such/log.jsonl: the folder");
 }
 
 }  // namespace kphi::test::faulty_wire_test
