@@ -23,7 +23,8 @@ constexpr const char* kProgram = "kphi-sentinel";
 
 [[noreturn]] void fail(int error, const std::string& doing) {
   throw DeviceError("sentinel", doing, std::generic_category().message(error),
-                    fmt::format("install kphi again: {} belongs beside it, or into ../libexec/kphi; without it a program that is killed leaves "
+                    fmt::format("install kphi again: {} belongs beside it, or into ../libexec/kphi; without it a "
+                                "program that is killed leaves "
                                 "the supply on",
                                 kProgram));
 }
@@ -40,7 +41,8 @@ std::string in_hex(const std::string& bytes) {
   return fmt::format("{:02x}", fmt::join(std::vector<std::uint8_t>(bytes.begin(), bytes.end()), ""));
 }
 
-/// By number, since the sentinel asks no name server.
+/// All addresses of its name, by number and with commas, since the sentinel asks no name server: the first one need not
+/// be that at which the device listens.
 std::string address_of(const LastWord& word) {
   if (word.wire == LastWord::Wire::serial || word.wire == LastWord::Wire::usb) return word.where;
   addrinfo wanted{};
@@ -48,10 +50,13 @@ std::string address_of(const LastWord& word) {
   addrinfo* found = nullptr;
   if (::getaddrinfo(word.where.c_str(), nullptr, &wanted, &found) != 0) return word.where;
   const std::unique_ptr<addrinfo, decltype(&freeaddrinfo)> all(found, &freeaddrinfo);
-  std::array<char, NI_MAXHOST> text{};
-  if (::getnameinfo(found->ai_addr, found->ai_addrlen, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) != 0)
-    return word.where;
-  return text.data();
+  std::string addresses;
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+    std::array<char, NI_MAXHOST> text{};
+    if (::getnameinfo(one->ai_addr, one->ai_addrlen, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) == 0)
+      addresses += (addresses.empty() ? "" : ",") + std::string(text.data());
+  }
+  return addresses.empty() ? word.where : addresses;
 }
 
 std::vector<std::string> arguments_of(const std::vector<LastWord>& words) {

@@ -1,7 +1,8 @@
 // kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
 // its end. Needs the C library alone, so that it is small and nothing in it can fail.
 // Usage: kphi-sentinel (DEVICE udp|tcp|serial|usb WHERE PORT|BAUD|PIPE BYTES ANSWER FROM LOCK)…, bytes in hexadecimal
-// digits. Its standard input is the line to that program: a byte releases the sentinel, an end without one is a death.
+// digits, several addresses of one WHERE with commas. Its standard input is the line to that program: a byte releases
+// the sentinel, an end without one is a death.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
@@ -96,15 +97,28 @@ int opened_serial(const Word& word) {
   return port;
 }
 
-int opened_socket(const Word& word, int type) {
+/// How many addresses a host has.
+int addresses_of(const char* where) {
+  int n = 1;
+  for (; *where != 0; ++where) n += *where == ',';
+  return n;
+}
+
+/// At its address number `which`.
+int opened_socket(const Word& word, int type, int which) {
+  char where[64] = "";
+  const char* begin = word.where;
+  while (which-- > 0) begin = strchr(begin, ',') + 1;
+  const size_t n = strcspn(begin, ",");
+  if (n < sizeof where) memcpy(where, begin, n);
   sockaddr_storage to{};
   auto* v4 = reinterpret_cast<sockaddr_in*>(&to);
   auto* v6 = reinterpret_cast<sockaddr_in6*>(&to);
   socklen_t length = sizeof *v4;
-  if (inet_pton(AF_INET, word.where, &v4->sin_addr) == 1) {
+  if (inet_pton(AF_INET, where, &v4->sin_addr) == 1) {
     v4->sin_family = AF_INET;
     v4->sin_port = htons(static_cast<uint16_t>(word.number));
-  } else if (inet_pton(AF_INET6, word.where, &v6->sin6_addr) == 1) {
+  } else if (inet_pton(AF_INET6, where, &v6->sin6_addr) == 1) {
     v6->sin6_family = AF_INET6;
     v6->sin6_port = htons(static_cast<uint16_t>(word.number));
     length = sizeof *v6;
@@ -192,14 +206,17 @@ bool takes(const char* lock) {
 
 /// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.
 bool say(const Word& word) {
-  for (int attempt = 0; attempt < kTries; ++attempt) {
+  const bool serial = strcmp(word.wire, "serial") == 0, udp = strcmp(word.wire, "udp") == 0;
+  const int addresses = udp || strcmp(word.wire, "tcp") == 0 ? addresses_of(word.where) : 1;
+  bool told = false;
+  for (int attempt = 0; attempt < kTries || attempt % addresses != 0; ++attempt) {
     if (strcmp(word.wire, "usb") == 0) {
       if (told_over_usb(word)) return true;
       poll(nullptr, 0, kQuiet_ms);
       continue;
     }
-    const bool serial = strcmp(word.wire, "serial") == 0, udp = strcmp(word.wire, "udp") == 0;
-    const int file = serial ? opened_serial(word) : opened_socket(word, udp ? SOCK_DGRAM : SOCK_STREAM);
+    const int which = attempt % addresses;
+    const int file = serial ? opened_serial(word) : opened_socket(word, udp ? SOCK_DGRAM : SOCK_STREAM, which);
     if (file < 0) {
       poll(nullptr, 0, kQuiet_ms);
       continue;
@@ -207,9 +224,11 @@ bool say(const Word& word) {
     const bool sent = write(file, word.bytes.of, word.bytes.n) == static_cast<ssize_t>(word.bytes.n);
     const bool done = sent && (word.answer.n == 0 || answered(file, word.answer));
     close(file);
-    if (done) return true;
+    told = told || done;
+    // A datagram does not tell whether anybody was there: each address gets one.
+    if (done && (!udp || which + 1 == addresses)) return true;
   }
-  return false;
+  return told;
 }
 
 }  // namespace

@@ -52,8 +52,8 @@ class Device {
     }
     port_ = ntohs(here.sin_port);
   }
-  [[nodiscard]] LastWord word(std::string bytes, std::string answer = {}) const {
-    return {"device", wire_, "localhost", port_, std::move(bytes), std::move(answer)};
+  [[nodiscard]] LastWord word(std::string bytes, std::string answer = {}, std::string where = "localhost") const {
+    return {"device", wire_, std::move(where), port_, std::move(bytes), std::move(answer)};
   }
   /// The next message; "" after a long silence. It is answered with `answer`.
   [[nodiscard]] std::string heard(const std::string& answer = {}) const {
@@ -117,6 +117,15 @@ TEST(Sentinel, SpeaksFromTheAddressOfTheBenchFile) {
   EXPECT_EQ(supply.heard("off"), "off");
   EXPECT_EQ(box.speaker, 0x7f000003u);
   EXPECT_EQ(supply.speaker, 0x7f000003u);
+}
+
+// A name may have several addresses, of which the device has one.
+TEST(Sentinel, SaysThemAtEveryAddressOfTheDevice) {
+  const Device box(Wire::udp), supply(Wire::tcp);
+  const char* const all = "::1,127.0.0.2,127.0.0.1";
+  let_a_program_end({box.word("stop", "", all), supply.word("off", "done", all)}, be_killed);
+  EXPECT_EQ(box.heard(), "stop");
+  EXPECT_EQ(supply.heard("done"), "off");
 }
 
 TEST(Sentinel, SaysThemAlsoOfOneThatLeftWithoutAWord) {
