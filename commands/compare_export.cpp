@@ -12,6 +12,7 @@
 #include "fit/export/targets.hpp"
 #include "fit/propellers/claims.hpp"
 #include "fit/propellers/compare.hpp"
+#include "fit/propellers/history.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
@@ -32,17 +33,25 @@ struct CompareRequest {
   bool json = false;
 };
 
-/// Propellers of a family: every folder fitted again as its coefficients.yaml says.
+/// Propellers of a family, or the history of one: every folder fitted again as its coefficients.yaml says.
 ExitCode compare_family(const CompareRequest& request) {
   if (!request.expect.empty()) throw ConfigurationError("--expect needs exactly two results: it is their verdict");
   std::vector<PropellerSize> sizes;
   for (const std::string& text : request.predict) sizes.push_back(parse_propeller_size(text));
   std::vector<Fitted> family;
+  std::vector<std::string> when;
   for (const std::string& path : request.results) {
     if (!fs::is_directory(path))
       throw ConfigurationError(
           path + ": not a folder; several propellers are compared from their folders, with steps.csv in them");
-    family.push_back(fitted_again(path).fitted);
+    auto [input, fitted] = fitted_again(path);
+    family.push_back(std::move(fitted));
+    when.push_back(input.provenance.measured_utc);
+  }
+  if (of_one_propeller(family) && !request.claims && sizes.empty()) {
+    const History history = history_of(family, request.results, when);
+    fmt::print("{}", request.json ? history_json(history) : history_text(history));
+    return ExitCode::ok;
   }
   const FamilyFindings findings = findings_of(family, sizes);
   fmt::print("{}", request.json ? Json(findings).dump(2) + "\n" : family_text(findings));
@@ -116,13 +125,15 @@ ExitCode run_export(const ExportRequest& request) {
 void add_compare(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<CompareRequest>(
       program, exit_code, "compare",
-      "compare two results (differences, uncertainties, verdict) or the propellers of a family",
+      "compare two results (differences, uncertainties, verdict), the campaigns of one propeller over time, or the "
+      "propellers of a family",
       "kphi compare results/<monday> results/<tuesday> --expect agree\n"
+      "kphi compare results/*_icra2021_5in_3blade\n"
       "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3",
       run_compare);
   add_argument(command, "RESULT", request.results,
                "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or the fitted folders of "
-               "several propellers")
+               "one propeller, from four on for a control chart, or of several propellers")
       ->expected(1, 100)
       ->check(kExistingPath);
   command.add_option("--expect", request.expect, "exit with 5 unless this is the verdict")

@@ -13,8 +13,10 @@
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/table_line.hpp"
 #include "fit/propellers/claims.hpp"
+#include "fit/propellers/history.hpp"
 #include "fit/report/figures.hpp"
 #include "fit/report/fit_summary.hpp"
+#include "fit/report/history_section.hpp"
 #include "fit/report/raw_samples.hpp"
 #include "fit/report/report.hpp"
 #include "fit/signal/blade_pass.hpp"
@@ -324,7 +326,14 @@ ExitCode report_several(const ReportRequest& request) {
     family.push_back(std::move(fitted));
     chapters.push_back({std::move(input.provenance), drawn});
   }
-  write_page(page, format_reports(family, chapters, draw({family_figure(family)}, figures)));
+  std::optional<History> history;
+  if (family.size() >= kLeastHistory && of_one_propeller(family)) {
+    std::vector<std::string> when;
+    for (const Chapter& chapter : chapters) when.push_back(chapter.provenance.measured_utc);
+    history = history_of(family, request.folders, when);
+  }
+  const Figure together = history ? history_figure(*history) : family_figure(family);
+  write_page(page, format_reports(family, chapters, draw({together}, figures), history ? &*history : nullptr));
   return ExitCode::ok;
 }
 

@@ -91,9 +91,8 @@ Claim linear(const Fitted& member) {
   const HypothesisTest& test = member.analysis.line.test.lack_of_fit;
   const std::string& propeller = member.identification.propeller;
   Claim claim = judged(fmt::format("linear_{}", propeller),
-                       fmt::format("thrust falls linearly with the occlusion ({}); p of the lack of fit, {} or above",
-                                   propeller, kTestLevel),
-                       "1", {}, kTestLevel, 1);
+                       fmt::format("thrust falls linearly with the occlusion ({})", propeller), "1", {}, kTestLevel, 1);
+  claim.is_p = true;
   if (!test.tested()) return claim;
   claim.value = test.p;  // without an interval
   claim.verdict = test.rejected() ? Verdict::fails : Verdict::holds;
@@ -152,6 +151,12 @@ std::optional<Estimate> growth_per_inch(Family family, Air air, int blades) {
 
 std::string between(double lower, double upper) {
   return std::isfinite(lower) || std::isfinite(upper) ? fmt::format("{:.4g} to {:.4g}", lower, upper) : "-";
+}
+
+std::string test_line(const Claim& claim) {
+  const bool tested = claim.verdict != Verdict::not_tested;
+  return fmt::format("{:<11} {:>14}  {}\n", name_of(claim.verdict), tested ? fmt::format("{:.4f}", claim.value) : "-",
+                     claim.statement);
 }
 
 std::string claim_line(const Claim& claim) {
@@ -231,9 +236,14 @@ FamilyFindings findings_of(std::span<const Fitted> family, std::span<const Prope
 }
 
 std::string family_text(const FamilyFindings& findings) {
-  std::string text = fmt::format("{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", "verdict", "found", "95 %", "allowed",
-                                 "unit", "the paper's statement");
-  for (const Claim& claim : findings.claims) text += claim_line(claim);
+  std::string text = fmt::format("{:<11} {:>14}  the paper's statement; a test rejects it where p is below {}\n",
+                                 "verdict", "p, lack of fit", kTestLevel);
+  for (const Claim& claim : findings.claims)
+    if (claim.is_p) text += test_line(claim);
+  text += fmt::format("\n{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", "verdict", "found", "95 %", "allowed", "unit",
+                      "the paper's statement");
+  for (const Claim& claim : findings.claims)
+    if (!claim.is_p) text += claim_line(claim);
   text += findings.air == Air::standard
               ? "\nPropellers are compared in standard air, 1.225 kg/m3.\n"
               : "\nPropellers are compared in the air of their days: some densities are unknown.\n";

@@ -29,6 +29,7 @@ struct Claim {
   double allowed_lower = -std::numeric_limits<double>::infinity();
   double allowed_upper = std::numeric_limits<double>::infinity();
   Verdict verdict = Verdict::not_tested;
+  bool is_p = false;  ///< the value is the p of a test that would reject the claim below `allowed_lower`; no interval
 };
 
 /// All claims, also those that these propellers cannot test. The paper gives no tolerances; those in the table are

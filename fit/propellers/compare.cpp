@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/json.hpp"
@@ -262,17 +263,15 @@ const char* word(Agreement verdict) {
 }
 
 std::string comparison_table(const Comparison& comparison) {
-  std::string text =
-      fmt::format("A  {}\nB  {}\n\n{:<10} {:>13} {:>13} {:>11} {:>9} {:>7} {:>9} {:>9}\n", comparison.a.name,
-                  comparison.b.name, "", "A", "B", "B - A", "u", "freedom", "B/A - 1", "p");
+  std::string text = fmt::format("A  {}\nB  {}\n", comparison.a.name, comparison.b.name), unit;
   for (const Difference& entry : comparison.differences) {
-    // fmt pads by display width, so that k(45°) keeps its column.
-    text += fmt::format("{:<10} {:>13.5e} {:>13.5e} {:>+11.2e} {:>9} {:>7} {:>+7.2f} % {:>9}{}\n", entry.name, entry.a,
+    // A table for each unit. fmt pads by display width, so that k(45°) keeps its column.
+    if (std::exchange(unit, entry.unit) != entry.unit)
+      text += fmt::format("\nin {}\n{:<10} {:>13} {:>13} {:>11} {:>9} {:>9} {:>9}\n", unit, "", "A", "B", "B - A",
+                          "95 %, ±", "B/A - 1", "p");
+    text += fmt::format("{:<10} {:>13.5e} {:>13.5e} {:>+11.2e} {:>9} {:>+7.2f} % {:>9}{}\n", entry.name, entry.a,
                         entry.b, entry.difference,
-                        entry.standard_error ? fmt::format("{:.1e}", *entry.standard_error) : "?",
-                        !entry.standard_error ? "?"
-                        : entry.freedom > 999 ? ">999"
-                                              : fmt::format("{:.0f}", entry.freedom),
+                        entry.standard_error ? fmt::format("{:.1e}", entry.coverage * *entry.standard_error) : "?",
                         100 * entry.share(), probability(entry.p), entry.significant ? " *" : "");
   }
   text += "\n";

@@ -50,13 +50,22 @@ std::string slopes_section(std::span<const SharedSlope> slopes) {
 }
 
 std::string claims_section(std::span<const Claim> claims) {
+  HtmlTable tests({HtmlTable::text("statement"), "p, lack of fit", HtmlTable::text("verdict")});
   HtmlTable table(
       {HtmlTable::text("statement"), "found", "95 %", "allowed", HtmlTable::text("unit"), HtmlTable::text("verdict")});
-  for (const Claim& claim : claims)
-    table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
-               interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit), name_of(claim.verdict)},
-              claim.verdict == Verdict::fails ? std::optional<std::size_t>(5) : std::nullopt);
-  return html_section("The paper's statements", table);
+  for (const Claim& claim : claims) {
+    const bool fails = claim.verdict == Verdict::fails;
+    if (claim.is_p)
+      tests.row({typeset(claim.statement), html_number(claim.value, "{:.4f}"), name_of(claim.verdict)},
+                fails ? std::optional<std::size_t>(2) : std::nullopt);
+    else
+      table.row({typeset(claim.statement), html_number(claim.value, "{:.4g}"), interval(claim.lower, claim.upper),
+                 interval(claim.allowed_lower, claim.allowed_upper), typeset(claim.unit), name_of(claim.verdict)},
+                fails ? std::optional<std::size_t>(5) : std::nullopt);
+  }
+  return html_section("The paper's statements", tests,
+                      fmt::format("The line fails where its test finds p below {}.", kTestLevel)) +
+         html_section("The paper's numbers", table);
 }
 
 }  // namespace kphi::fit

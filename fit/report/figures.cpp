@@ -19,16 +19,6 @@ using Curves = std::vector<std::string>;
 
 double rpm(double speed_rad_s) { return to_rpm(RadPerSec(speed_rad_s)); }
 
-std::string cell(double value) { return shortest(value); }
-std::string cell(int value) { return fmt::format("{}", value); }
-std::string cell(const std::string& text) { return text; }
-
-template <class... Cells>
-std::string csv_row(const Cells&... cells) {
-  std::string row = (("," + cell(cells)) + ...) + "\n";
-  return row.substr(1);
-}
-
 std::string symmetric_axis(double reach) {
   return fmt::format("set yrange [{:.6g}:{:.6g}]\nset xzeroaxis lt 1 lc rgb '#999999'\n", -reach, reach);
 }
@@ -76,7 +66,7 @@ std::string share_axes(const Identification& identification, const std::vector<T
   std::string tics;
   for (std::size_t i = 0; i < table.size(); ++i) {
     if (i > 0) gap = std::min(gap, table[i].phi_deg - table[i - 1].phi_deg);
-    tics += fmt::format("{}'{}°' {}", i == 0 ? "" : ", ", cell(table[i].phi_deg), cell(table[i].phi_deg));
+    tics += fmt::format("{}'{}°' {}", i == 0 ? "" : ", ", csv_cell(table[i].phi_deg), csv_cell(table[i].phi_deg));
   }
   const double width = 0.4 * gap;
   return fmt::format(
@@ -114,7 +104,7 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
     if (rows.empty()) continue;
     data += data_block(fmt::format("share{}", i), rows);
     curves.push_back(fmt::format("$share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}", i,
-                                 cell(shares[i].phi_deg), curves.size() == 1 ? "title 'thrust'" : "notitle"));
+                                 csv_cell(shares[i].phi_deg), curves.size() == 1 ? "title 'thrust'" : "notitle"));
   }
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const double phi = identification.table[i].phi_deg, k = identification.table[i].k,
@@ -164,7 +154,7 @@ Figure thrust_figure(const Identification& identification) {
                                                             end * end * 1e-6, thrust(fit.parameters, end)));
     fits.push_back(fmt::format("$fit{} using 1:2 with lines lw 1.6 lc rgb '{}' notitle", i, colour));
     fits.push_back(fmt::format("$points{} using 1:2 with points pt {} ps 0.45 lc rgb '{}' title 'φ = {}°'", i, shape,
-                               colour, cell(row.phi_deg)));
+                               colour, csv_cell(row.phi_deg)));
     residual_plots.push_back(
         fmt::format("$points{} using 1:3 with points pt {} ps 0.4 lc rgb '{}' notitle", i, shape, colour));
   }
@@ -209,7 +199,7 @@ Figure speed_figure(const Identification& identification) {
     panels +=
         fmt::format("{}{}set label 1 'φ = {}°' at graph 0.985, graph 0.86 right tc rgb '{}'\n",
                     i > 0 ? "unset label 2\n" : "", i == last ? "set format x '%g'\nset xlabel 'speed, RPM'\n" : "",
-                    cell(row.phi_deg), colour) +
+                    csv_cell(row.phi_deg), colour) +
         plot({"0 with lines lw 0.6 lc rgb '#999999' notitle",
               fmt::format("$k{} using 1:2:3 with yerrorbars pt {} ps 0.5 lw 0.8 lc rgb '{}' notitle", i, shape, colour),
               fmt::format("$k{} using 1:2 with lines lw 1 lc rgb '{}' notitle", i, colour)});
@@ -235,7 +225,7 @@ Figure repetition_figure(const Identification& identification) {
   std::string tics, data;
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const OcclusionCoefficient& row = identification.table[i];
-    tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", cell(row.phi_deg), i);
+    tics += fmt::format("{}'{}°' {}", tics.empty() ? "" : ", ", csv_cell(row.phi_deg), i);
     std::map<int, std::vector<Point>> runs;
     for (const results::StepMean& step : row.measured)
       runs[step.repetition].push_back({step.speed_rad_s, step.thrust_n, 1});
@@ -285,7 +275,7 @@ Figure power_figure(const Identification& identification) {
     const std::size_t i = curves.size();
     data += data_block(fmt::format("power{}", i), rows);
     curves.push_back(fmt::format("$power{} using 1:2 with linespoints pt {} ps 0.5 lw 1.2 lc rgb '{}' title 'φ = {}°'",
-                                 i, mark(i).shape, mark(i).colour, cell(phi_deg)));
+                                 i, mark(i).shape, mark(i).colour, csv_cell(phi_deg)));
   }
   figure.script = figure_head(400) + data +
                   "set xrange [0:*]\nset yrange [0:*]\nset xlabel 'thrust, N'\nset ylabel 'thrust per power, g/W'\n"

@@ -124,6 +124,9 @@ std::string data_block(const std::string& name, const std::string& rows) {
   return fmt::format("${} << EOD\n{}EOD\n", name, rows);
 }
 
+std::string csv_cell(double value) { return shortest(value); }
+std::string csv_cell(std::string_view text) { return std::string(text); }
+
 std::string plot(const std::vector<std::string>& curves) {
   return fmt::format("plot \\\n  {}\n", fmt::join(curves, ", \\\n  "));
 }

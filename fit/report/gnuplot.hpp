@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kphi::fit {
@@ -48,6 +49,15 @@ struct Mark {
 
 /// A named block of inline data.
 [[nodiscard]] std::string data_block(const std::string& name, const std::string& rows);
+
+/// A row of a figure's CSV: numbers as short as they can be read back, text as it is.
+[[nodiscard]] std::string csv_cell(double value);
+[[nodiscard]] std::string csv_cell(std::string_view text);
+template <class... Cells>
+[[nodiscard]] std::string csv_row(const Cells&... cells) {
+  std::string row = (("," + csv_cell(cells)) + ...) + "\n";
+  return row.substr(1);
+}
 
 /// One `plot` command of several curves.
 [[nodiscard]] std::string plot(const std::vector<std::string>& curves);

@@ -11,6 +11,7 @@
 #include "fit/report/campaign_sections.hpp"
 #include "fit/report/family_sections.hpp"
 #include "fit/report/fit_summary.hpp"
+#include "fit/report/history_section.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {
@@ -110,21 +111,33 @@ std::string page_head(const std::string& title, const std::string& heading, cons
       title, report_style(), heading, sub);
 }
 
-/// The first figure belongs to the headline, the others follow the table.
-std::string body(const Fitted& fitted, const Chapter& chapter, int& number) {
+std::string figure_section(const Figures& figures, std::size_t begin, std::size_t end, const char* heading,
+                           int& number) {
+  const std::string drawn = figure_blocks(figures, begin, end, number);
+  return drawn.empty() ? "" : html_heading(heading) + "<div class=\"figures\">\n" + drawn + "</div>\n";
+}
+
+/// The first figure belongs to the headline, the others follow the table. Of a page of several propellers each chapter
+/// is two pages in print; what a propeller alone shows besides is in its appendix.
+std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool alone) {
   const auto& [identification, analysis] = fitted;
   const auto& [provenance, figures] = chapter;
-  const std::string first = figure_blocks(figures, 0, 1, number);
-  const std::string details = figure_blocks(figures, 1, figures.drawn.size(), number);
-  return verdict_box(analysis.flight) + lead(identification) + headline(fitted) + first + skipped_note(figures) +
-         remark_section(analysis.remarks) + coefficient_section(fitted) + standard_section(fitted) +
-         (details.empty()
-              ? ""
-              : html_heading("How well the model holds") + "<div class=\"figures\">\n" + details + "</div>\n") +
-         analysis_sections(analysis) + campaign_sections(identification, provenance) +
-         "<details class=\"appendix\"><summary>Appendix: tests, torque, power, steps left out, runs and their "
-         "hashes</summary>\n" +
-         analysis_appendix(analysis) + campaign_appendix(identification, provenance) + "</details>\n";
+  const std::size_t shown = alone ? figures.drawn.size() : 5;
+  std::string html = verdict_box(analysis.flight) + lead(identification) + headline(fitted);
+  html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
+          coefficient_section(fitted);
+  if (alone) html += standard_section(fitted);
+  html += figure_section(figures, 1, shown, "How well the model holds", number);
+  const std::string more = analysis_sections(analysis) + campaign_sections(identification, provenance);
+  if (alone) html += more;
+  html += fmt::format(
+      "<details class=\"appendix\"><summary>Appendix: {}tests, torque, power, steps left out, runs and "
+      "their hashes</summary>\n",
+      alone ? "" : "standard air, uncertainty budget, k in flight, provenance, ");
+  if (!alone)
+    html +=
+        standard_section(fitted) + figure_section(figures, shown, figures.drawn.size(), "More figures", number) + more;
+  return html + analysis_appendix(analysis) + campaign_appendix(identification, provenance) + "</details>\n";
 }
 
 }  // namespace
@@ -134,24 +147,33 @@ std::string format_report(const Fitted& fitted, const Chapter& chapter) {
   const std::string name = html_escaped(fitted.identification.propeller);
   return page_head("k(φ) of " + name, name + ": how an occlusion costs thrust",
                    propeller_line(fitted.identification, chapter.provenance)) +
-         body(fitted, chapter, number) + kPageEnd;
+         body(fitted, chapter, number, true) + kPageEnd;
 }
 
-std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters, const Figures& together) {
+std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters, const Figures& together,
+                           const History* history) {
   std::string names, contents, bodies;
   int number = 0;
   const std::string figure = figure_blocks(together, 0, together.drawn.size(), number) + skipped_note(together);
   for (std::size_t i = 0; i < family.size(); ++i) {
-    const Identification& one = family[i].identification;
-    const std::string name = html_escaped(one.propeller);
+    const Provenance& provenance = chapters[i].provenance;
+    const std::string name =
+        html_escaped(history != nullptr && provenance.measured_utc.size() >= 10 ? provenance.measured_utc.substr(0, 10)
+                                                                                : family[i].identification.propeller);
     names += (names.empty() ? "" : ", ") + name;
     contents += fmt::format("<a href=\"#chapter{}\">{}</a>", i + 1, name);
     bodies += fmt::format("<h2 class=\"chapter\" id=\"chapter{}\">{}</h2>\n", i + 1,
-                          propeller_line(one, chapters[i].provenance)) +
-              body(family[i], chapters[i], number);
+                          propeller_line(family[i].identification, provenance)) +
+              body(family[i], chapters[i], number, false);
   }
-  return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) + "<nav>" +
-         contents + "</nav>\n" + family_section(family) + figure + slopes_section(shared_slopes(family)) +
+  const std::string navigation = "<nav>" + contents + "</nav>\n";
+  if (history != nullptr) {
+    const std::string propeller = html_escaped(history->propeller);
+    return page_head("k(φ) of " + propeller + " over time", propeller + ": its campaigns over time", names) +
+           navigation + figure + history_section(*history) + bodies + kPageEnd;
+  }
+  return page_head("k(φ) of " + names, "How an occlusion costs thrust: k(φ) of several propellers", names) +
+         navigation + family_section(family) + figure + slopes_section(shared_slopes(family)) +
          claims_section(test_claims(family)) + bodies + kPageEnd;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "fit/coefficients/coefficients.hpp"
+#include "fit/propellers/history.hpp"
 #include "fit/report/gnuplot.hpp"
 #include "fit/uncertainty/analysis.hpp"
 
@@ -21,8 +22,9 @@ struct Chapter {
 [[nodiscard]] std::string format_report(const Fitted& fitted, const Chapter& chapter);
 
 /// Several campaigns on one page, a chapter each: first their comparison with the figure `together` and the paper's
-/// statements about several propellers, then each of them.
+/// statements about several propellers, then each of them. With a `history`, of one propeller: first how its campaigns
+/// changed over time.
 [[nodiscard]] std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters,
-                                         const Figures& together);
+                                         const Figures& together, const History* history = nullptr);
 
 }  // namespace kphi::fit
