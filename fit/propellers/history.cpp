@@ -165,8 +165,12 @@ Chart chart_of(const std::vector<HistoryEntry>& entries, Followed quantity) {
   chart.quantity = quantity;
   chart.freedom = static_cast<double>(entries.size()) - 1;
   chart.change = change_of(series, kShares[static_cast<std::size_t>(quantity)]);
-  const double between = between_of(series, {}, chart.freedom);
-  const Step mean = fitted(series, {}, between);
+  std::vector<double> x;  // what is named does not widen the limits
+  for (std::size_t i = 0; chart.change && chart.change->kind != ChangeKind::drift && i < entries.size(); ++i)
+    x.push_back(chart.change->names(i) ? 1 : 0);
+  if (!x.empty()) --chart.freedom;
+  const double between = between_of(series, x, chart.freedom);
+  const Step mean = fitted(series, x, between);
   chart.freedom = freedom_of(series, between, chart.freedom);
   chart.centre = {mean.mean, mean.mean_u, chart.freedom};
   chart.between = std::sqrt(between) / std::abs(mean.mean);
@@ -293,6 +297,8 @@ const char* name_of(Followed quantity) {
   constexpr std::array<const char*, kFollowed.size()> names{"all k together", "K_T", "slope"};
   return names[static_cast<std::size_t>(quantity)];
 }
+
+bool Change::names(std::size_t campaign) const { return kind == ChangeKind::one_off ? at == campaign : campaign >= at; }
 
 bool History::steady() const {
   return std::ranges::none_of(charts, [](const Chart& chart) { return chart.change.has_value(); });

@@ -42,6 +42,8 @@ struct Change {
   double share = 0;    ///< of the centre; of a drift from the first to the last campaign
   double u_share = 0;  ///< standard
   double p = 1;        ///< that chance alone brings one this large anywhere in the history
+
+  [[nodiscard]] bool names(std::size_t campaign) const;
 };
 
 struct Chart {

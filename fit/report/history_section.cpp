@@ -20,10 +20,7 @@ struct Panel {
 constexpr std::array<Panel, kFollowed.size()> kPanels{
     {{"all k together, %", 100, 1}, {"K_T, 10⁻⁶ N/(rad/s)²", 1e6, 0}, {"slope, 10⁻⁹ N/(rad/s)² per °", 1e9, 0}}};
 
-bool is_changed(const Chart& chart, std::size_t i) {
-  if (!chart.change) return false;
-  return chart.change->kind == ChangeKind::one_off ? chart.change->at == i : i >= chart.change->at;
-}
+bool is_named(const Chart& chart, std::size_t i) { return chart.change && chart.change->names(i); }
 
 double expanded(const Estimate& one) { return coverage_factor(one.freedom) * one.u; }
 
@@ -47,7 +44,7 @@ Figure history_figure(const History& history) {
                    limit = scale * chart.limits[i];
       rows += fmt::format("{} {:.8g} {:.8g} {:.8g} {:.8g} {:.8g} {}\n", i, value, scale * expanded(one), centre,
                           centre - limit, centre + limit, entry.when.substr(0, 10));
-      if (is_changed(chart, i)) named += fmt::format("{} {:.8g}\n", i, value);
+      if (is_named(chart, i)) named += fmt::format("{} {:.8g}\n", i, value);
       figure.csv += csv_row(name_of(chart.quantity), entry.when, entry.name, one.value, expanded(one),
                             chart.centre.value, chart.limits[i]);
     }
@@ -76,22 +73,24 @@ std::string history_section(const History& history) {
                    &slope = entry.of(Followed::slope);
     std::optional<std::size_t> bad;
     for (std::size_t j = history.charts.size(); j-- > 0;)
-      if (is_changed(history.charts[j], i)) bad = 2 + j;
+      if (is_named(history.charts[j], i)) bad = 2 + j;
     table.row({html_escaped(entry.when.substr(0, 10)), html_escaped(entry.name),
                html_number(100 * (stand.value - 1), "{:+.3f}") + " ± " + html_number(100 * expanded(stand), "{:.3f}"),
                with_power_of_ten(K_T.value, expanded(K_T)), with_power_of_ten(slope.value, expanded(slope))},
               bad);
   }
-  std::string said;
-  for (const std::string& line : findings_of(history)) said += "<li>" + typeset(line) + "</li>\n";
-  return "<div class=\"remarks\"><h3>" +
-         std::string(history.steady() ? "The stand is steady" : "The stand has changed") + "</h3>\n<ul>\n" + said +
-         "</ul></div>\n" +
-         html_section("The campaigns over time", table,
+  return html_section("The campaigns over time", table,
                       history.air == Air::standard
                           ? "In standard air; ± is 95 % of what is new in each campaign."
                           : "In the air of their days, since some densities are unknown; ± is 95 % of what is new in "
                             "each campaign.");
+}
+
+std::string history_verdict(const History& history) {
+  std::string said;
+  for (const std::string& line : findings_of(history)) said += "<li>" + typeset(line) + "</li>\n";
+  return fmt::format("<div class=\"remarks\"><h3>{}</h3>\n<ul>\n{}</ul></div>\n",
+                     history.steady() ? "The stand is steady" : "The stand has changed", said);
 }
 
 }  // namespace kphi::fit

@@ -11,7 +11,9 @@ namespace kphi::fit {
 /// A control chart for the stand, K_T and the slope: every campaign ± 95 %, the mean, and the limits that hold 99.7 %.
 [[nodiscard]] Figure history_figure(const History& history);
 
-/// What was found, in sentences, and the campaigns as a table.
+/// What was found, in sentences.
+[[nodiscard]] std::string history_verdict(const History& history);
+/// The campaigns as a table.
 [[nodiscard]] std::string history_section(const History& history);
 
 }  // namespace kphi::fit

@@ -9,13 +9,16 @@
 #include <nlohmann/json.hpp>
 
 #include "results/digest.hpp"
+#include "results/file_layer.hpp"
 #include "test/compensation/flight/bench_coefficients.hpp"
 #include "test/daq/bench_fixture.hpp"
+#include "test/fit/export/outside_reader.hpp"
 
 namespace kphi::test {
 namespace campaigns_test {
 
 using testing::AllOf;
+using testing::AnyOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
@@ -123,6 +126,28 @@ TEST_F(Campaigns, ArePackedWholeWithChecksumsAndTheWordsOfAnArchive) {
   EXPECT_EQ(entities["#creator"]["name"], "A. Name");
   EXPECT_THAT(contents[root + "README.md"], HasSubstr("fly with care"));
   EXPECT_EQ(say({"pack", campaign_.string(), "--out", file}).code, 2) << "never over another file";
+}
+
+TEST_F(Campaigns, AreReadFromThePackageByTheLinesOfItsReadme) {
+  if (!works("/usr/bin/python3 -c 'import h5py, pandas'")) GTEST_SKIP() << "no python3-h5py or python3-pandas";
+  const TemporaryFolder out;
+  const std::string file = (out.path() / "c.zip").string();
+  ASSERT_EQ(say({"pack", campaign_.string(), "--out", file}).code, 0);
+  for (const auto& [name, bytes] : contents_of(file)) {
+    fs::create_directories((out.path() / name).parent_path());
+    std::ofstream(out.path() / name, std::ios::binary) << bytes;
+  }
+  const fs::path unpacked = out.path() / campaign_.filename();
+  std::istringstream readme(results::read_text(unpacked / "README.md"));
+  int lines = 0;
+  for (std::string line; std::getline(readme, line);) {
+    if (!line.starts_with("    ")) continue;
+    const auto reading = read_with("cd " + unpacked.string() + " && PATH=/usr/bin:/bin " + line.substr(4));
+    EXPECT_EQ(reading.status, 0) << line << reading.out;
+    EXPECT_THAT(reading.out, AnyOf(HasSubstr(": OK"), HasSubstr("blades"), HasSubstr("ft_sequence"))) << line;
+    ++lines;
+  }
+  EXPECT_EQ(lines, 3);
 }
 
 TEST_F(Campaigns, AreNotPackedWithDamage) {

@@ -39,6 +39,8 @@ TEST(History, NamesTheCampaignThatStandsApart) {
   EXPECT_EQ(stand(charts).change->kind, ChangeKind::one_off);
   EXPECT_EQ(stand(charts).change->at, 6u);
   EXPECT_NEAR(stand(charts).change->share, 0.008, 0.003);
+  EXPECT_LT(stand(charts).limits[6], 0.006) << "its own distance does not widen the limits";
+  EXPECT_NEAR(stand(charts).centre.value, 1, 0.001);
 }
 
 TEST(History, NamesTheCampaignFromWhichAllAreShifted) {
@@ -101,7 +103,7 @@ TEST(History, OfWholeCampaignsNamesAShiftOfHalfAPercent) {
   const History shifted = simulated_history(10, 1, 6, 1.005, 0.001);
   EXPECT_FALSE(shifted.steady());
   EXPECT_THAT(history_text(shifted), HasSubstr("all k together: c6 of 2026-03-13 stands +0."));
-  EXPECT_THAT(history_section(shifted), HasSubstr("The stand has changed"));
+  EXPECT_THAT(history_verdict(shifted), HasSubstr("The stand has changed"));
   const auto json = nlohmann::json::parse(history_json(shifted));
   EXPECT_EQ(json["charts"][0]["change"]["name"], "c6");
   EXPECT_EQ(json["charts"][0]["campaigns"].size(), 10u);
