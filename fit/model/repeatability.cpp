@@ -41,20 +41,21 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
                                   double k, const results::ZeroMovement& movement) {
   std::map<int, RunSums> runs;
   std::map<int, double> moved;
+  std::map<int, results::SharedZero> zeros;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     RunSums& run = runs[steps[i].repetition];
-    run.zero_u_n = std::fmax(run.zero_u_n, steps[i].zero_u_n);  // ignores an unknown one
     moved.try_emplace(steps[i].repetition, movement.of_run_n(steps[i]));
     const double w = weight_of(fit, i), x = shape(fit, k, i);
     run.xt += w * x * fit.points[i].thrust_n;
     run.xx += w * x * x;
     run.x += w * x;
+    zeros[steps[i].repetition].add(steps[i], w * x);
   }
   std::vector<RunSums> result;
   for (auto& [repetition, run] : runs) {
     run.phi_deg = phi_deg;
     run.repetition = repetition;
-    run.zero_u_n = results::shared_zero_u(run.zero_u_n, moved.at(repetition));
+    run.zero_u_n = zeros.at(repetition).u_n(moved.at(repetition));
     if (run.xx > 0) result.push_back(run);
   }
   return result;

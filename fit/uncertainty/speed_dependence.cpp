@@ -31,10 +31,9 @@ struct Run {
 
 std::vector<Run> runs_of(std::span<const results::StepMean> steps, double zero_movement_n) {
   std::map<int, Run> runs;
-  std::map<int, double> zeros;
+  std::map<int, results::SharedZero> zeros;
   for (const results::StepMean& step : steps) {
-    double& zero_u = zeros[step.repetition];
-    zero_u = std::fmax(zero_u, step.zero_u_n);  // ignores an unknown one
+    zeros[step.repetition].add(step, 1);
     if (!(step.speed_rad_s > 0)) continue;
     runs[step.repetition].samples.push_back(
         {step.step, step.speed_rad_s, step.speed_rad_s * step.speed_rad_s, step.thrust_n});
@@ -44,7 +43,7 @@ std::vector<Run> runs_of(std::span<const results::StepMean> steps, double zero_m
     double xt = 0, xx = 0;
     for (const Sample& sample : run.samples) xt += sample.x * sample.thrust, xx += sample.x * sample.x;
     run.k = xt / xx;
-    if (const double u = results::shared_zero_u(zeros[repetition], zero_movement_n); u > 0) run.zero_u_n = u;
+    if (const double u = zeros[repetition].u_n(zero_movement_n); u > 0) run.zero_u_n = u;
     std::ranges::sort(run.samples, {}, &Sample::level);
     result.push_back(std::move(run));
   }

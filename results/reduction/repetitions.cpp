@@ -110,18 +110,19 @@ std::set<int> good_levels(const Group& run) {
 
 /// k and its uncertainty, over these levels.
 void fit_k(const Group& run, const std::set<int>& levels, const ZeroMovement& movement, RepetitionFigure& figure) {
-  double tx = 0, xx = 0, x_sum = 0, variance = 0, zero_u = 0;
+  double tx = 0, xx = 0, x_sum = 0, variance = 0;
+  SharedZero zero;
   for (const StepMean* step : run) {
-    if (is_good(*step)) zero_u = std::fmax(zero_u, step->zero_u_n);  // ignores an unknown one
     if (!levels.contains(step->step)) continue;
     const double x = square(step->speed_rad_s);
     tx += step->thrust_n * x;
     xx += x * x;
     x_sum += x;
     variance += square(x * u_within(*step));
+    zero.add(*step, x);
   }
   figure.k = tx / xx;
-  figure.u = std::sqrt(variance + square(shared_zero_u(zero_u, movement.of_run_n(*run.front())) * x_sum)) / xx;
+  figure.u = std::sqrt(variance + square(zero.u_n(movement.of_run_n(*run.front())) * x_sum)) / xx;
 }
 
 std::vector<RepetitionFigure> figures_of(const Runs& runs, const ZeroMovement& movement) {
@@ -351,6 +352,34 @@ double ZeroMovement::of_run_n(const StepMean& step) const {
   const auto own = of_run_.find({step.propeller, step.occlusion_deg, step.repetition});
   const double usual = usual_n();
   return own == of_run_.end() ? usual : std::hypot(usual, own->second.movement()) / std::sqrt(2.0);
+}
+
+void SharedZero::add(double zero_u_n, double begin_s, double end_s, double weight) {
+  parts_.push_back({begin_s, end_s, weight});
+  weights_ += weight;
+  if (!std::isnan(zero_u_n)) measured_ += weight * zero_u_n;
+}
+
+double SharedZero::u_n(double movement_n) const {
+  if (!(weights_ > 0)) return 0;
+  const double begin = std::ranges::min(parts_, {}, &Part::begin_s).begin_s,
+               end = std::ranges::max(parts_, {}, &Part::end_s).end_s;
+  double covariance = 1.0 / 12;
+  if (end > begin) {
+    // Σ w w' min(s, s') over steps in the order of time, from the sums of those that are later.
+    std::vector<std::pair<double, double>> sorted;
+    for (const Part& part : parts_)
+      sorted.emplace_back((0.5 * (part.begin_s + part.end_s) - begin) / (end - begin), part.weight / weights_);
+    std::ranges::sort(sorted);
+    double later = 1, least = 0, mean = 0;
+    for (const auto& [share, weight] : sorted) {
+      later -= weight;
+      least += share * weight * (weight + 2 * later);
+      mean += share * weight;
+    }
+    covariance = std::max(0.0, least - mean * mean);
+  }
+  return std::hypot(measured_ / weights_, movement_n * std::sqrt(covariance));
 }
 
 double freedom_between(std::span<const std::vector<RunShare>> occlusions) {

@@ -52,12 +52,25 @@ class ZeroMovement {
   std::map<std::tuple<std::string, double, int>, Range> of_run_;
 };
 
-/// Standard uncertainty of the zero that all steps of a run share, N: that of the measured zeros, and of a zero that
-/// wanders between them, where it is taken as a line in time. The mean of a random walk tied at both ends deviates by
-/// 1/√12 of the movement of the free one, as much as a rectangle over half of the movement (JCGM 100, 4.3.7).
-[[nodiscard]] inline double shared_zero_u(double measured_u_n, double movement_n) {
-  return std::hypot(measured_u_n, movement_n / std::sqrt(12.0));
-}
+/// The zero that all steps of a run share, as far as it gets into its k.
+class SharedZero {
+ public:
+  /// `weight` of the step in the mean of the zero: ω² where T = k ω² is fitted.
+  void add(const StepMean& step, double weight) { add(step.zero_u_n, step.window_begin_s, step.window_end_s, weight); }
+  void add(double zero_u_n, double begin_s, double end_s, double weight);
+  /// Standard uncertainty, N: of the measured zeros, and of a zero that wanders between them by `movement_n`, where it
+  /// is taken as a line in time. A random walk tied at both ends, and a jump at any time, have the covariance min(s, t)
+  /// − s t between the shares s and t of that time; steps that are run late and weigh most feel little of it. Without
+  /// times, and with all weights equal, 1/√12 of the movement, as of a rectangle (JCGM 100, 4.3.7).
+  [[nodiscard]] double u_n(double movement_n) const;
+
+ private:
+  struct Part {
+    double begin_s, end_s, weight;
+  };
+  std::vector<Part> parts_;
+  double measured_ = 0, weights_ = 0;
+};
 
 /// k of one run as a share of the k of its occlusion, with the variance that its noise and its zero explain.
 struct RunShare {
