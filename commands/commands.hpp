@@ -17,15 +17,15 @@ using Json = nlohmann::ordered_json;
 
 /// Adds a verb to the program. If the verb was given, parsing the command line runs it and sets `exit_code`.
 using AddVerb = void(CLI::App& program, ExitCode& exit_code);
-AddVerb add_init, add_list, add_pack, add_check, add_sim, add_devices, add_spin, add_weigh, add_run, add_replay,
-    add_info, add_verify, add_import, add_fit, add_report, add_compare, add_export, add_compensate, add_fly,
+AddVerb add_init, add_list, add_pack, add_check, add_plan, add_sim, add_devices, add_spin, add_weigh, add_run,
+    add_replay, add_info, add_verify, add_import, add_fit, add_report, add_compare, add_export, add_compensate, add_fly,
     add_completion;
 
 /// In the order of `kphi --help`.
-inline constexpr AddVerb* kVerbs[] = {add_init,    add_check,  add_sim,        add_devices, add_spin,
-                                      add_weigh,   add_run,    add_replay,     add_list,    add_info,
-                                      add_verify,  add_pack,   add_import,     add_fit,     add_report,
-                                      add_compare, add_export, add_compensate, add_fly,     add_completion};
+inline constexpr AddVerb* kVerbs[] = {add_init,       add_check,  add_plan,      add_sim,    add_devices, add_spin,
+                                      add_weigh,      add_run,    add_replay,    add_list,   add_info,    add_verify,
+                                      add_pack,       add_import, add_fit,       add_report, add_compare, add_export,
+                                      add_compensate, add_fly,    add_completion};
 
 /// A verb that calls `run` with its options, which live as long as the program. Its --help ends with `example`.
 template <class Options>

@@ -128,6 +128,37 @@ TEST_F(Campaigns, ArePackedWholeWithChecksumsAndTheWordsOfAnArchive) {
   EXPECT_EQ(say({"pack", campaign_.string(), "--out", file}).code, 2) << "never over another file";
 }
 
+TEST_F(Campaigns, TeachHowToPlanTheNextOne) {
+  const TemporaryFolder out;
+  const std::string written = (*parent_ / "campaign.yaml").string(), shorter = (out.path() / "short.yaml").string();
+  const Answer unknown = say({"plan", written});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("--pilot DIR"));
+  const Answer once = say({"plan", written, "--pilot", campaign_.string()});
+  EXPECT_EQ(once.code, 2) << "one repetition shows no noise";
+  EXPECT_THAT(once.err, HasSubstr("two repetitions"));
+  const std::vector<std::string> stand{"--stand", "noise-n=0.001",        "--stand", "runs=0.001",
+                                       "--stand", "k-t=1.55e-6",          "--stand", "intercept=1.03",
+                                       "--stand", "slope-per-deg=-0.0029"};
+  const auto plan = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"plan", written};
+    words.insert(words.end(), stand.begin(), stand.end());
+    words.insert(words.end(), more.begin(), more.end());
+    return say(words);
+  };
+  const Answer chosen = plan({"--want", "slope 1 %", "--out", shorter});
+  ASSERT_EQ(chosen.code, 0) << chosen.err;
+  EXPECT_THAT(chosen.out, AllOf(HasSubstr("written"), HasSubstr("slope ±"), HasSubstr("\n1 ")));
+  EXPECT_EQ(say({"check", shorter}).code, 0);
+  EXPECT_EQ(say({"plan", shorter, "--stand", "runs=0.001", "--stand", "k-t=1e-6", "--stand", "intercept=1"}).code, 0);
+  const Answer never = plan({"--want", "K_T 0.01 %", "--u", "calibration=0.002"});
+  EXPECT_EQ(never.code, 5);
+  EXPECT_THAT(never.out, HasSubstr("limited by cell calibration"));
+  EXPECT_EQ(plan({"--want", "slope"}).code, 2);
+  EXPECT_EQ(plan({"--want", "slope 1 %", "--out", shorter, "--choose", "99"}).code, 2);
+  EXPECT_EQ(nlohmann::json::parse(plan({"--want", "slope 1 %", "--json"}).out)["stand"]["runs"], 0.001);
+}
+
 TEST_F(Campaigns, AreReadFromThePackageByTheLinesOfItsReadme) {
   if (!works("/usr/bin/python3 -c 'import h5py, pandas'")) GTEST_SKIP() << "no python3-h5py or python3-pandas";
   const TemporaryFolder out;

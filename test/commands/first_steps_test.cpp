@@ -138,7 +138,7 @@ TEST_F(FirstSteps, EveryVerbEndsItsHelpWithAnExampleOfItsOwn) {
     EXPECT_EQ(help.code, 0) << verb;
     EXPECT_THAT(help.out, ContainsRegex("\n[^\n]*kphi " + verb + "[^\n]*\n+$")) << verb;
   }
-  EXPECT_EQ(count, 20);
+  EXPECT_EQ(count, 21);
 }
 
 TEST_F(FirstSteps, CompletionKnowsVerbsOptionsAndChoices) {

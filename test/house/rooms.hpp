@@ -74,6 +74,8 @@ inline const std::vector<Room>& rooms() {
       {"fit/signal", {"base", "compensation", "results", "fit"}},
       {"fit/uncertainty", {"base", "compensation", "results", "fit"}},
       {"fit/propellers", {"base", "compensation", "results", "fit"}},
+      // Of a campaign that was not run yet: the only room of the fit that sees one.
+      {"fit/plan", {"base", "compensation", "profiles", "results", "fit"}},
       {"fit/coefficients", {"base", "compensation", "results", "fit"}},
       {"fit/report", {"base", "compensation", "results", "fit"}},
       {"fit/logs", {"base", "compensation", "results", "fit"}},

@@ -1,0 +1,265 @@
+#include "fit/plan/choices.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "base/error.hpp"
+#include "base/json.hpp"
+#include "profiles/plan.hpp"
+#include "results/reduction/bin_statistics.hpp"
+
+namespace kphi::fit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using profiles::Campaign;
+
+constexpr int kLeastRepetitions = 2, kMostRepetitions = 8;
+constexpr std::size_t kMostInner = 6;
+constexpr double kBendToSee = 0.01;
+
+/// Which occlusions are run: 0°, the ends, and every choice of what lies between.
+std::vector<std::vector<double>> occlusion_sets(std::vector<double> all) {
+  std::ranges::sort(all);
+  std::vector<double> inner;
+  for (std::size_t i = 2; i + 1 < all.size(); ++i) inner.push_back(all[i]);
+  if (inner.empty() || inner.size() > kMostInner) return {all};
+  std::vector<std::vector<double>> sets;
+  for (unsigned bits = 1; bits < 1u << inner.size(); ++bits) {
+    std::vector<double> set{all[0], all[1]};
+    for (std::size_t i = 0; i < inner.size(); ++i)
+      if ((bits >> i & 1u) != 0) set.push_back(inner[i]);
+    set.push_back(all.back());
+    sets.push_back(set);
+  }
+  return sets;
+}
+
+std::vector<double> dwells(const PlanQuestion& question) {
+  std::set<double> all{question.campaign.profile.dwell.value()};
+  const double first = std::max(question.noise.settle_s, question.campaign.minimum_discard.value());
+  for (const double window : {results::kLeastWindow, 0.75, 1.0, 1.5, 2.0, 3.0})
+    all.insert(std::ceil(10 * (first + window) - 1e-9) / 10);
+  return {all.begin(), all.end()};
+}
+
+std::vector<int> step_numbers(const Campaign& campaign) {
+  std::set<int> all{campaign.profile.steps};
+  for (const int steps : {10, 14, 20, 28}) all.insert(std::min(steps, campaign.profile.steps));
+  return {all.begin(), all.end()};
+}
+
+Choice cost_of(const PlanQuestion& question, const Campaign& campaign) {
+  Choice choice;
+  choice.campaign = campaign;
+  const profiles::Plan plan = profiles::make_plan(campaign, question.bench);
+  choice.bench_min = plan.bench.value() / 60;
+  choice.mountings = plan.mountings;
+  choice.mounting_min = question.minutes_per_mounting * plan.mountings;
+  choice.runs = static_cast<int>(plan.runs.size());
+  if (question.bytes) choice.bytes = question.bytes(plan);
+  return choice;
+}
+
+void predict(const PlanQuestion& question, const std::vector<Wanted>& told, Choice& choice) {
+  const Prediction prediction(choice.campaign, question.noise, question.uncertainty, question.curve);
+  choice.told.clear();
+  for (const Wanted& wanted : told) choice.told.push_back(prediction.of(wanted));
+  choice.bend_seen = prediction.bend_seen();
+}
+
+bool fulfils(const PlanQuestion& question, const Choice& choice, double bend) {
+  for (std::size_t i = 0; i < question.wishes.size(); ++i)
+    if (!(share_of(choice.told[i]) <= question.wishes[i].share)) return false;
+  return !(choice.bend_seen > bend);
+}
+
+/// A campaign to look at, with what it costs before anything of it is predicted.
+struct Candidate {
+  Campaign campaign;
+  std::size_t kind = 0;  ///< occlusions and remounting: of each kind the cheapest is of interest
+  double minutes = 0;
+};
+
+std::vector<Candidate> candidates(const PlanQuestion& question) {
+  std::vector<Candidate> all;
+  std::size_t kind = 0;
+  const auto zeros = std::set<double>{question.campaign.zero.value(), 1, 2, 4};
+  for (const auto& occlusions_deg : occlusion_sets(question.campaign.occlusions_deg)) {
+    for (const bool remounts : {false, true}) {
+      Campaign campaign = question.campaign;
+      campaign.occlusions_deg = occlusions_deg;
+      campaign.order.remount_each_repetition = remounts;
+      for (int repetitions = kLeastRepetitions; repetitions <= kMostRepetitions; ++repetitions) {
+        campaign.repetitions = repetitions;
+        const int runs = repetitions * static_cast<int>(occlusions_deg.size()) + (campaign.order.reference ? 2 : 0);
+        const int mountings = remounts ? runs : static_cast<int>(occlusions_deg.size());
+        for (const int steps : step_numbers(question.campaign))
+          for (const double dwell : dwells(question))
+            for (const double zero : zeros) {
+              campaign.profile.steps = steps;
+              campaign.profile.dwell = Seconds(dwell);
+              campaign.zero = Seconds(zero);
+              const double run_s =
+                  steps * dwell * (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
+                  (campaign.box_bias ? 4 : 2) * zero;
+              all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
+            }
+      }
+      ++kind;
+    }
+  }
+  std::ranges::stable_sort(all, {}, &Candidate::minutes);
+  return all;
+}
+
+/// The campaign that knows most: everything as often and as long as it is looked at.
+Choice largest(const PlanQuestion& question, const std::vector<Wanted>& told) {
+  Campaign campaign = question.campaign;
+  campaign.repetitions = std::max(kMostRepetitions, campaign.repetitions);
+  campaign.order.remount_each_repetition = true;
+  campaign.profile.dwell = Seconds(dwells(question).back());
+  campaign.zero = Seconds(std::max(4.0, campaign.zero.value()));
+  Choice choice = cost_of(question, campaign);
+  predict(question, told, choice);
+  return choice;
+}
+
+std::string row_words(const Budget& budget) {
+  const BudgetRow* row = largest_row(budget);
+  return row == nullptr ? "nothing known"
+                        : fmt::format("{} ({:.0f} % of the variance)", row->source, 100 * budget.share(*row));
+}
+
+std::string occlusion_words(const Campaign& campaign) {
+  return fmt::format("{:g}", fmt::join(campaign.occlusions_deg, " "));
+}
+
+std::string percent(double share) {
+  return std::isfinite(share) ? fmt::format("{:.{}f} %", 100 * share, share < 0.01 ? 3 : 2) : "none";
+}
+
+std::string choice_line(const std::string& name, const Choice& choice) {
+  const Campaign& one = choice.campaign;
+  std::string line =
+      fmt::format("{:<8} {:>7.1f} {:>9} {:>4} {:>5.2f} GB  {:>2} x {:<18} {:<7} {:>3} x {:<4g}s {:>4g} s", name,
+                  choice.minutes(), choice.mountings, choice.runs, 1e-9 * static_cast<double>(choice.bytes),
+                  one.repetitions, occlusion_words(one), one.order.remount_each_repetition ? "remount" : "",
+                  one.profile.steps, one.profile.dwell.value(), one.zero.value());
+  for (const Budget& budget : choice.told) line += fmt::format(" {:>10}", percent(share_of(budget)));
+  return line + fmt::format(" {:>9}\n", percent(choice.bend_seen));
+}
+
+Json to_json(const Choice& choice) {
+  const Campaign& one = choice.campaign;
+  Json told = Json::array();
+  for (const Budget& budget : choice.told) {
+    const BudgetRow* row = largest_row(budget);
+    told.push_back({{"quantity", budget.quantity},
+                    {"value", budget.value},
+                    {"expanded_95", budget.expanded()},
+                    {"share_95", share_of(budget)},
+                    {"u", budget.combined()},
+                    {"freedom", budget.freedom()},
+                    {"limited_by", row == nullptr ? Json(nullptr) : Json(row->source)},
+                    {"not_known", budget.not_known()}});
+  }
+  return {{"minutes", choice.minutes()},
+          {"bench_min", choice.bench_min},
+          {"mountings", choice.mountings},
+          {"runs", choice.runs},
+          {"bytes", choice.bytes},
+          {"occlusions_deg", one.occlusions_deg},
+          {"repetitions", one.repetitions},
+          {"remount_each_repetition", one.order.remount_each_repetition},
+          {"steps", one.profile.steps},
+          {"dwell_s", one.profile.dwell.value()},
+          {"zero_s", one.zero.value()},
+          {"bend_seen_share", std::isfinite(choice.bend_seen) ? Json(choice.bend_seen) : Json(nullptr)},
+          {"told", told}};
+}
+
+}  // namespace
+
+PlanAnswer answer(const PlanQuestion& question) {
+  PlanAnswer result;
+  for (const Wish& wish : question.wishes) result.told.push_back(wish.of);
+  if (result.told.empty()) result.told = usual_wants(question.campaign);
+  result.as_written = cost_of(question, question.campaign);
+  predict(question, result.told, result.as_written);
+  if (question.wishes.empty()) return result;
+
+  const Choice most = largest(question, result.told);
+  for (std::size_t i = 0; i < question.wishes.size(); ++i)
+    if (!(share_of(most.told[i]) <= question.wishes[i].share))
+      result.unreachable.push_back({question.wishes[i], share_of(most.told[i]), row_words(most.told[i])});
+  if (!result.unreachable.empty()) return result;
+
+  const double bend = std::max(kBendToSee, result.as_written.bend_seen);
+  std::set<std::size_t> found;
+  for (const Candidate& candidate : candidates(question)) {
+    if (found.contains(candidate.kind)) continue;
+    Choice choice;
+    choice.campaign = candidate.campaign;
+    predict(question, result.told, choice);
+    if (!fulfils(question, choice, bend)) continue;
+    const std::vector<Budget> told = std::move(choice.told);
+    const double bend_seen = choice.bend_seen;
+    choice = cost_of(question, candidate.campaign);
+    choice.told = told;
+    choice.bend_seen = bend_seen;
+    result.choices.push_back(std::move(choice));
+    found.insert(candidate.kind);
+    if (result.choices.size() == kMostChoices) break;
+  }
+  return result;
+}
+
+std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) {
+  std::string text = fmt::format("{:<8} {:>7} {:>9} {:>4} {:>8}  {:<23} {:<7} {:<10} {:>6}", "", "minutes", "mountings",
+                                 "runs", "disk", "occlusions, °", "", "speeds", "zero");
+  for (const Wanted& wanted : answer.told) text += fmt::format(" {:>10}", wanted.name() + " ±");
+  text += fmt::format(" {:>9}\n", "bend seen");
+  text += choice_line("written", answer.as_written);
+  for (std::size_t i = 0; i < answer.choices.size(); ++i)
+    text += choice_line(fmt::format("{}", i + 1), answer.choices[i]);
+  text += fmt::format(
+      "\n± is half of the expected 95 % interval; minutes with {:g} for each mounting; a bend of k(φ) of "
+      "that share of K_T is found in 95 of 100 campaigns\n",
+      question.minutes_per_mounting);
+  for (std::size_t i = 0; i < answer.told.size(); ++i)
+    text +=
+        fmt::format("{:<10} as written limited by {}\n", answer.told[i].name(), row_words(answer.as_written.told[i]));
+  std::set<std::string> unknown;
+  for (const std::string& name : answer.as_written.told.front().not_known()) unknown.insert(name);
+  if (!unknown.empty()) text += fmt::format("unknown and not in it: {} (see --u)\n", fmt::join(unknown, ", "));
+  for (const Unreachable& one : answer.unreachable)
+    text += fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n",
+                        one.wish.of.name(), percent(one.wish.share), percent(one.best), kMostRepetitions, one.because);
+  return text;
+}
+
+std::string answer_json(const PlanQuestion& question, const PlanAnswer& answer) {
+  Json noise, choices = Json::array(), unreachable = Json::array();
+  for (const auto& [name, value] : known_noise(question.noise)) noise[name] = value;
+  for (const Choice& choice : answer.choices) choices.push_back(to_json(choice));
+  for (const Unreachable& one : answer.unreachable)
+    unreachable.push_back({{"quantity", one.wish.of.name()},
+                           {"wanted_share_95", one.wish.share},
+                           {"best_share_95", one.best},
+                           {"because", one.because}});
+  const Json json{{"campaign", question.campaign.name},
+                  {"stand", noise},
+                  {"minutes_per_mounting", question.minutes_per_mounting},
+                  {"as_written", to_json(answer.as_written)},
+                  {"choices", choices},
+                  {"unreachable", unreachable}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,35 @@
+// Predicted against found: five campaigns on three stands, 200 times each.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "test/fit/plan/plan_study.hpp"
+
+namespace kphi::fit {
+namespace plan_long_test {
+
+TEST(TwoHundredCampaigns, ScatterAsThePlanSaidWithinFifteenPercent) {
+  using Kind = Wanted::Kind;
+  const std::vector<Wanted> told{{Kind::thrust_coefficient, 0}, {Kind::slope, 0}, {Kind::k, 135}};
+  for (const SimulatedStand& stand : stands()) {
+    const StandNoise noise = piloted(stand, 60, 7000);
+    int number = 0;
+    for (const profiles::Campaign& campaign : designs()) {
+      const Prediction prediction(campaign, noise, {});
+      const std::vector<Found> found = found_by(campaign, stand, 200, told, 50'000);
+      std::string line = fmt::format("{:<34} campaign {}", stand.name, ++number);
+      for (std::size_t i = 0; i < told.size(); ++i) {
+        const Budget budget = prediction.of(told[i]);
+        const double ratio = budget.combined() / found[i].scatter;
+        line += fmt::format("  {} {:.4f} % predicted, {:.4f} % found", found[i].name,
+                            100 * budget.combined() / std::abs(budget.value),
+                            100 * found[i].scatter / std::abs(budget.value));
+        EXPECT_GT(ratio, 0.85) << stand.name << ", campaign " << number << ", " << found[i].name;
+        EXPECT_LT(ratio, 1.15) << stand.name << ", campaign " << number << ", " << found[i].name;
+      }
+      fmt::print("{}\n", line);
+    }
+  }
+}
+
+}  // namespace plan_long_test
+}  // namespace kphi::fit
