@@ -12,6 +12,7 @@
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/table_line.hpp"
+#include "fit/plan/outlook.hpp"
 #include "fit/propellers/claims.hpp"
 #include "fit/propellers/history.hpp"
 #include "fit/report/figures.hpp"
@@ -178,18 +179,26 @@ FamilyFindings family_findings(const FitRequest& request, const Fitted& fitted) 
   return findings_of(family, {});
 }
 
+std::optional<OneMore> one_more(const FitInput& input, const Fitted& fitted) {
+  if (!input.measured_by) return std::nullopt;
+  return one_more_repetition(fitted, *input.measured_by, input.bench,
+                             input.provenance.bench.value_or(BenchUncertainty{}));
+}
+
 void print_findings(const FitRequest& request, const FitInput& input, const Fitted& fitted, const fs::path& file) {
   const Json raw = request.raw ? raw_json(input) : Json();
   std::optional<FamilyFindings> family;
   if (!request.family.empty()) family = family_findings(request, fitted);
   if (!request.json) {
     fmt::print("{}", headline_text(fitted));
+    if (const auto more = one_more(input, fitted)) fmt::print("{}\n", to_words(*more));
     if (family) fmt::print("\n{}", family_text(*family));
     if (!raw.is_null()) fmt::print("{}\n", raw.dump(2));
     return;
   }
   Json json = fit_json(fitted.identification, fitted.analysis, file);
   if (family) json.update(Json(*family));
+  if (const auto more = one_more(input, fitted)) json["one_more_repetition"] = to_json(*more);
   if (!raw.is_null()) json["raw"] = raw;
   print_json(json);
 }

@@ -98,17 +98,18 @@ FitInput campaign_input(const fs::path& path) {
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
   const std::string load_cell = take_runs(folder, input.provenance);
-  if (fs::exists(folder.campaign_file()))
-    input.provenance.operator_name = profiles::load_campaign(folder.campaign_file().string()).operator_name;
   if (fs::exists(folder.bench_file())) {
-    const profiles::BenchConfig bench = profiles::load_bench(folder.bench_file().string());
+    input.bench = profiles::load_bench(folder.bench_file().string());
+    const profiles::BenchConfig& bench = input.bench;
     input.provenance.stand = bench.name;
     const auto& gain = bench.iq.clock_gain;
     input.provenance.clock = gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
     take_weighing(path, bench, load_cell, input);
   }
   if (fs::exists(folder.campaign_file())) {
-    const profiles::Campaign campaign = profiles::load_campaign(folder.campaign_file().string());
+    input.measured_by = profiles::load_campaign(folder.campaign_file().string());
+    const profiles::Campaign& campaign = *input.measured_by;
+    input.provenance.operator_name = campaign.operator_name;
     input.provenance.campaign = campaign.name;
     input.provenance.propeller_name = campaign.propeller.name;
     input.provenance.supply_v = campaign.supply.value();

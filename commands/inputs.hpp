@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/curve_fit.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "profiles/bench_config.hpp"
+#include "profiles/campaign.hpp"
 #include "profiles/vehicle.hpp"
 #include "results/step_mean.hpp"
 
@@ -23,9 +26,11 @@ struct FitInput {
   std::vector<results::StepMean> steps;
   std::vector<fit::CurvePoint> table;  ///< instead of steps
   fit::Provenance provenance;
-  std::filesystem::path folder;           ///< where the outputs go
-  bool campaign = false;                  ///< `folder` is a campaign folder
-  bool mounted_once = false;              ///< one mounting for all repetitions of an occlusion
+  std::optional<profiles::Campaign> measured_by{};  ///< of a campaign folder: what was asked of the stand
+  profiles::BenchConfig bench{};                    ///< of a campaign folder: of which stand
+  std::filesystem::path folder;                     ///< where the outputs go
+  bool campaign = false;                            ///< `folder` is a campaign folder
+  bool mounted_once = false;                        ///< one mounting for all repetitions of an occlusion
   std::optional<double> u_calibration{};  ///< relative, of the load cell, by the weighing in provenance.cell_weighed
 };
 

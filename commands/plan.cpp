@@ -1,6 +1,5 @@
 // `kphi plan`: what a campaign will tell before it is run, and the cheapest ones that tell what is wanted.
 #include <algorithm>
-#include <filesystem>
 #include <vector>
 
 #include "commands/commands.hpp"
@@ -14,7 +13,6 @@ namespace kphi::commands {
 namespace {
 
 using namespace fit;
-namespace fs = std::filesystem;
 
 struct PlanRequest {
   std::string campaign, bench, out;
@@ -24,20 +22,16 @@ struct PlanRequest {
   bool json = false;
 };
 
-double zero_s_of(const fs::path& folder) {
-  const fs::path file = folder / "campaign.yaml";
-  return fs::exists(file) ? profiles::load_campaign(file.string()).zero.value() : 1;
-}
-
 /// What the pilots say of the stand, its errors and the curve.
 void take_pilots(const PlanRequest& request, PlanQuestion& question) {
   std::vector<FittedFolder> folders;
   for (const std::string& path : request.pilots) folders.push_back(fitted_again(path));
-  std::vector<Pilot> pilots;
+  std::vector<PilotCampaign> pilots;
   std::vector<Fitted> fitted;
   std::vector<std::string> when;
   for (std::size_t i = 0; i < folders.size(); ++i) {
-    pilots.push_back({folders[i].fitted, zero_s_of(request.pilots[i]), folders[i].input.mounted_once});
+    pilots.push_back({folders[i].fitted, folders[i].input.measured_by ? folders[i].input.measured_by->zero.value() : 1,
+                      folders[i].input.mounted_once});
     fitted.push_back(folders[i].fitted);
     when.push_back(folders[i].input.provenance.measured_utc);
   }

@@ -8,6 +8,7 @@
 #include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/so_far.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/campaign/campaign_run.hpp"
 #include "daq/campaign/dry_run.hpp"
@@ -32,6 +33,7 @@ struct RunOptions {
   std::string resume;  ///< a campaign's folder
   bool accept_changes = false;
   std::string answers;
+  std::vector<std::string> wishes;
   bool dry_run = false;
   bool yes = false;
   bool json = false;
@@ -150,6 +152,7 @@ void announce(const RunRequest& request, const DryRun& dry) {
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
 CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination,
                        Operator& person, live::LiveSession& view, const std::function<bool()>& stop_asked) {
+  const SoFar known = so_far(request.campaign, request.options.wishes);
   const auto& [options, campaign, config, answers] = request;
   const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
@@ -164,13 +167,14 @@ CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, De
   const auto progress = view.beside(printed, bench->clock());
   return view.tell_the_end([&] {
     return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
-                        destination.resumption ? &*destination.resumption : nullptr, &findings);
+                        destination.resumption ? &*destination.resumption : nullptr, &findings, known);
   });
 }
 
 ExitCode run(const RunOptions& options) {
   RunRequest request{options, campaign_of(options), profiles::load_bench(options.bench), std::nullopt};
   if (!options.answers.empty()) request.answers = profiles::load_answers(options.answers);
+  (void)so_far(request.campaign, options.wishes);  // before anything happens
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;
   profiles::require_within(campaign, config);
@@ -217,6 +221,9 @@ void add_run(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--answers", "FILE", options.answers,
             "file with the operator's answers, for a run without a terminal")
       ->excludes(yes);
+  add_value(command, "--want", "\"WHAT PERCENT %\"", options.wishes,
+            "after each run, tell how far it is to this (see kphi plan); may be repeated")
+      ->allow_extra_args(false);
   command.add_flag("--json", options.json, "print the result as one JSON object");
   add_live_options(command, options.live);
 }

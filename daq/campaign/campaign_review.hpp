@@ -35,6 +35,8 @@ class CampaignReview {
   [[nodiscard]] std::optional<AnotherRun> another(double occlusion_deg);
   /// Repetitions of the occlusion so far, reference runs not counted.
   [[nodiscard]] int repetitions(double occlusion_deg) const;
+  /// Of all runs so far but the reference runs.
+  [[nodiscard]] const std::vector<results::StepMean>& steps() const { return steps_; }
   [[nodiscard]] const SpeedCap& cap() const { return cap_; }
   /// After the last run.
   void conclude();

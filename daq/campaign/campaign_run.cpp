@@ -49,7 +49,7 @@ class CampaignRun {
  public:
   CampaignRun(Bench& bench, const profiles::Campaign& campaign, const profiles::BenchConfig& config,
               const results::CampaignFolder& folder, Operator& person, Progress& progress,
-              const std::function<bool()>& stop_asked)
+              const std::function<bool()>& stop_asked, const SoFar& so_far)
       : bench_(bench),
         campaign_(campaign),
         config_(config),
@@ -57,6 +57,7 @@ class CampaignRun {
         person_(person),
         progress_(progress),
         stop_asked_(stop_asked),
+        so_far_(so_far),
         plan_(profiles::make_plan(campaign, config)),
         journal_(folder.journal(), bench.files()),
         review_(campaign, progress, [this](const char* event, const json& data) { note(event, data); }),
@@ -342,6 +343,8 @@ class CampaignRun {
     progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}", result_.runs, planned_,
                               run.file.filename().string(), run.account.received, lost, flagged, means.size(),
                               rest_words(run.stop)));
+    if (!so_far_ || planned.is_reference()) return;
+    if (const std::string words = so_far_(review_.steps()); !words.empty()) progress_.reached(words);
   }
 
   /// Returns how many of its steps are flagged.
@@ -379,6 +382,7 @@ class CampaignRun {
   Operator& person_;
   Progress& progress_;
   const std::function<bool()>& stop_asked_;
+  const SoFar& so_far_;
   const profiles::Plan plan_;
   results::Journal journal_;
   CampaignReview review_;
@@ -396,8 +400,8 @@ class CampaignRun {
 CampaignResult run_campaign(Bench& bench, const profiles::Campaign& campaign, const profiles::BenchConfig& config,
                             const results::CampaignFolder& folder, Operator& person, Progress& progress,
                             const std::function<bool()>& stop_asked, const Resumption* resumption,
-                            const std::vector<BenchFinding>* audited) {
-  return CampaignRun(bench, campaign, config, folder, person, progress, stop_asked).run(resumption, audited);
+                            const std::vector<BenchFinding>* audited, const SoFar& so_far) {
+  return CampaignRun(bench, campaign, config, folder, person, progress, stop_asked, so_far).run(resumption, audited);
 }
 
 }  // namespace kphi::daq

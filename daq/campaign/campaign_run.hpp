@@ -3,6 +3,9 @@
 
 #include <functional>
 #include <limits>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/bench.hpp"
@@ -11,6 +14,7 @@
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/step_mean.hpp"
 
 namespace kphi::daq {
 
@@ -34,6 +38,10 @@ struct CampaignResult {
   int flagged_steps = 0;
 };
 
+/// One line on what the steps so far tell, or none; called after each accepted run, by the runner's thread, while the
+/// motor is at rest. Must not throw.
+using SoFar = std::function<std::string(std::span<const results::StepMean>)>;
+
 /// Runs everything in order into `folder`. Each finished run is hashed in the journal and its step means are in
 /// steps.csv before the next begins. Throws what record_run and Operator::mount throw; the journal then holds why.
 /// `resumption`: of an existing folder. Its accepted runs stay as they are, unfinished runs are renamed, steps.csv and
@@ -43,6 +51,6 @@ struct CampaignResult {
                                           const profiles::BenchConfig& config, const results::CampaignFolder& folder,
                                           Operator& person, Progress& progress, const std::function<bool()>& stop_asked,
                                           const Resumption* resumption = nullptr,
-                                          const std::vector<BenchFinding>* audited = nullptr);
+                                          const std::vector<BenchFinding>* audited = nullptr, const SoFar& so_far = {});
 
 }  // namespace kphi::daq

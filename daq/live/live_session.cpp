@@ -64,6 +64,11 @@ void LiveProgress::say(const std::string& line) {
   feed_.tell(line_message(to_seconds(clock_.now()), line));
 }
 
+void LiveProgress::reached(const std::string& words) {
+  inner_.reached(words);
+  feed_.tell(reached_message(words));
+}
+
 void LiveProgress::asks(const std::string& question) {
   inner_.asks(question);
   feed_.tell(ask_message(question));

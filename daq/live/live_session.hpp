@@ -40,6 +40,7 @@ class LiveProgress final : public Progress {
   void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
   void asks(const std::string& question) override;
+  void reached(const std::string& words) override;
 
  private:
   void add_to_step(const Position& position, const Observation& seen, Instant now);

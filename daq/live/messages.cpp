@@ -100,6 +100,10 @@ Message line_message(double time_s, const std::string& text) {
   return {Message::Kind::other, text_of({{"type", "line"}, {"time_s", time_s}, {"text", text}})};
 }
 
+Message reached_message(const std::string& text) {
+  return {Message::Kind::other, text_of({{"type", "reached"}, {"text", text}})};
+}
+
 Message ask_message(const std::string& text) {
   return {Message::Kind::other, text_of({{"type", "ask"}, {"text", text}})};
 }

@@ -3,7 +3,7 @@
 //   hello    once, first: format "kphi-live/2", replay (bool), by_hand (bool), weighs (bool), name, propeller,
 //            speed_max_rpm, limits as in `limits`
 //   history  once, second: trace [[time_s, thrust_n, commanded_rpm, speed_rpm], …], messages [limits, step, line, stop,
-//            end, …]
+//            reached, end, …]
 //   limits   the guard's limits from now on: limits [{key, name, unit, limit, lower (bool), source}]
 //   tick     30 times a second: time_s, progress (0 to 1), remaining_s, propeller, phase ("" in a step), step (0-based,
 //            -1 outside steps), steps, occlusion_deg, repetition (1-based), repetitions, run (1-based, 0: not of a
@@ -15,6 +15,7 @@
 //   step     a step is over: occlusion_deg, repetition, step, speed_rpm, speed2_rad2_s2, thrust_n, k_n_s2, u_k_n_s2, n
 //   line     a line of the log: time_s, text
 //   ask      a person is asked this in the terminal, the motor is locked meanwhile: text; empty: answered
+//   reached  what the campaign knows so far: text
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text
 //
@@ -98,6 +99,7 @@ struct Message {
 [[nodiscard]] Message step_message(const Position& at, const StepFigures& seen);
 [[nodiscard]] Message line_message(double time_s, const std::string& text);
 [[nodiscard]] Message ask_message(const std::string& text);
+[[nodiscard]] Message reached_message(const std::string& text);
 [[nodiscard]] Message stop_message(double time_s);
 [[nodiscard]] Message end_message(double time_s, bool well, const std::string& text);
 

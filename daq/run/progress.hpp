@@ -47,6 +47,8 @@ class Progress {
   virtual void step_done(const Position&, const Observation&) {}
   /// A line to keep.
   virtual void say(const std::string&) {}
+  /// What the campaign knows so far, one line.
+  virtual void reached(const std::string& words) { say(words); }
   /// A person is asked this at the stand, where they see it; empty: answered.
   virtual void asks(const std::string&) {}
 };

@@ -140,9 +140,7 @@ std::string occlusion_words(const Campaign& campaign) {
   return fmt::format("{:g}", fmt::join(campaign.occlusions_deg, " "));
 }
 
-std::string percent(double share) {
-  return std::isfinite(share) ? fmt::format("{:.{}f} %", 100 * share, share < 0.01 ? 3 : 2) : "none";
-}
+std::string percent(double share) { return std::isfinite(share) ? in_percent(share) + " %" : "none"; }
 
 std::string choice_line(const std::string& name, const Choice& choice) {
   const Campaign& one = choice.campaign;

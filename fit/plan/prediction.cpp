@@ -218,6 +218,11 @@ double Prediction::bend_seen() const {
 
 double share_of(const Budget& budget) { return budget.expanded() / std::abs(budget.value); }
 
+std::string in_percent(double share) {
+  const double value = 100 * share;
+  return fmt::format("{:.{}f}", value, value < 0.1 ? 3 : value < 10 ? 2 : 1);
+}
+
 const BudgetRow* largest_row(const Budget& budget) {
   const auto largest = std::ranges::max_element(budget.rows, {}, &BudgetRow::contribution);
   return largest == budget.rows.end() || !(largest->contribution() > 0) ? nullptr : &*largest;

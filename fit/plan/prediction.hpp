@@ -55,6 +55,9 @@ class Prediction {
 /// Half of the 95 % interval as a share of the value.
 [[nodiscard]] double share_of(const Budget& budget);
 
+/// A share in percent with the digits that a reader needs: "0.060", "0.25", "12.5".
+[[nodiscard]] std::string in_percent(double share);
+
 /// The row that contributes most; nullptr if none is known.
 [[nodiscard]] const BudgetRow* largest_row(const Budget& budget);
 

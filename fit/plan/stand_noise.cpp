@@ -198,7 +198,7 @@ double minutes_of(const Identification& one) {
 }
 
 /// Noise of steps and zeros, and the wander of the zeros: each tells a part of what the others scatter by.
-void take_noise(const Pilot& pilot, StandNoise& noise) {
+void take_noise(const PilotCampaign& pilot, StandNoise& noise) {
   constexpr int kRounds = 3;
   const Identification& one = pilot.fitted.identification;
   const double minutes = minutes_of(one), zero_s = pilot.zero_s > 0 ? pilot.zero_s : 1;
@@ -214,7 +214,8 @@ void take_noise(const Pilot& pilot, StandNoise& noise) {
 
 /// The k of a pilot's runs against those of their occlusion, with what noise and zeros explain of them: the zeros as
 /// uncertain as this noise makes them, which their own samples need not show.
-void add_shares(const Pilot& pilot, const StandNoise& noise, std::vector<std::vector<results::RunShare>>& shares) {
+void add_shares(const PilotCampaign& pilot, const StandNoise& noise,
+                std::vector<std::vector<results::RunShare>>& shares) {
   const Identification& one = pilot.fitted.identification;
   const double zero_s = pilot.zero_s > 0 ? pilot.zero_s : 1;
   for (std::size_t i = 0; i < one.table.size(); ++i) {
@@ -242,7 +243,7 @@ void add_shares(const Pilot& pilot, const StandNoise& noise, std::vector<std::ve
   }
 }
 
-StandNoise noise_of(const Pilot& pilot) {
+StandNoise noise_of(const PilotCampaign& pilot) {
   const auto& [identification, analysis] = pilot.fitted;
   StandNoise noise;
   take_noise(pilot, noise);
@@ -274,9 +275,9 @@ double mean(std::span<const StandNoise> all, double StandNoise::*member) {
 }
 
 /// Scatter from run to run, of all pilots together.
-void take_runs(std::span<const Pilot> pilots, StandNoise& noise) {
+void take_runs(std::span<const PilotCampaign> pilots, StandNoise& noise) {
   std::vector<std::vector<results::RunShare>> shares;
-  for (const Pilot& pilot : pilots) add_shares(pilot, noise, shares);
+  for (const PilotCampaign& pilot : pilots) add_shares(pilot, noise, shares);
   const double variance = results::variance_between(shares);
   noise.runs_freedom = results::freedom_of(variance, shares);
   if (pilots.front().mounted_once) {
@@ -305,11 +306,12 @@ double StandNoise::k_at(double phi_deg) const {
   return phi_deg == 0 ? K_T : K_T * (intercept + slope_per_deg * phi_deg);
 }
 
-StandNoise noise_of(std::span<const Pilot> pilots) {
-  if (std::ranges::any_of(pilots, [&](const Pilot& one) { return one.mounted_once != pilots.front().mounted_once; }))
+StandNoise noise_of(std::span<const PilotCampaign> pilots) {
+  if (std::ranges::any_of(pilots,
+                          [&](const PilotCampaign& one) { return one.mounted_once != pilots.front().mounted_once; }))
     throw ConfigurationError("some pilots were remounted for each repetition, others not; name those of one kind");
   std::vector<StandNoise> all;
-  for (const Pilot& pilot : pilots) all.push_back(noise_of(pilot));
+  for (const PilotCampaign& pilot : pilots) all.push_back(noise_of(pilot));
   StandNoise noise = all.front();
   for (double StandNoise::*member : {&StandNoise::noise_n, &StandNoise::noise_share, &StandNoise::slow_n,
                                      &StandNoise::slow_share, &StandNoise::zero_n, &StandNoise::zero_walk_n})

@@ -45,7 +45,7 @@ struct StandNoise {
 };
 
 /// A pilot, and what its steps do not say.
-struct Pilot {
+struct PilotCampaign {
   const Fitted& fitted;
   double zero_s = 0;          ///< length of each of a run's two zeros
   bool mounted_once = false;  ///< one mounting for all runs of an occlusion
@@ -53,7 +53,7 @@ struct Pilot {
 
 /// Of all pilots together, which are of one propeller: noise as the root mean square, the scatter of runs pooled.
 /// Throws ConfigurationError without any repetition, or if some pilots were remounted for each and others not.
-[[nodiscard]] StandNoise noise_of(std::span<const Pilot> pilots);
+[[nodiscard]] StandNoise noise_of(std::span<const PilotCampaign> pilots);
 
 /// "NAME=VALUE" replaces one number, in the units of the members: noise-n, noise-share, memory-s, slow-n,
 /// slow-share, slow-memory-s, settle-s, zero-n, zero-walk-n, runs, mounting, campaigns, model, bend, k-t, intercept,

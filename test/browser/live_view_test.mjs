@@ -217,6 +217,11 @@ try {
     assert.match(await page.locator('#clock').innerText(), /^\d\d:\d\d:\d\d$/);
   });
 
+  await it('says what is known so far', async () => {
+    await page.evaluate(() => take.reached({ text: 'so far K_T ± 0.05 %' }));
+    assert.equal(await page.locator('#k_card #reached').innerText(), 'so far K_T ± 0.05 %');
+  });
+
   await it('lets a person zoom, read a value, choose a curve, and compare with the repetition before', async () => {
     await turns(page, run, 3);
     await page.waitForFunction(() => !at('ghost_key').hidden);

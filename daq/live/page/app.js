@@ -360,6 +360,7 @@ const take = {
     banner('', message.text ? 'Asked in the terminal:' : '', message.text ? `${message.text} The motor is locked.` : '');
     title(message.text ? 'waiting – ' : '');
   },
+  reached(message) { text('reached', message.text); },
   stop(message) {
     state.asked = true;
     addLine(message.time_s, 'STOP pressed on this page');

@@ -274,6 +274,21 @@ TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
   EXPECT_GE(apart_s, paused_s) << "nothing was driven meanwhile";
 }
 
+TEST_F(OrderedCampaign, TellsAfterEachRunWhatIsKnownSoFar) {
+  campaign_ = campaign("0", 2, "order: {reference: true}\n");
+  prepare();
+  AutoConfirmOperator robot;
+  std::vector<std::size_t> steps;
+  const SoFar so_far = [&](std::span<const results::StepMean> known) {
+    steps.push_back(known.size());
+    return known.size() > campaign_.profile.levels().size() ? std::string("so far: two runs") : std::string();
+  };
+  (void)run_campaign(*bench_, campaign_, config_, *results_, robot, said_, test::never, nullptr, nullptr, so_far);
+  const std::size_t one = campaign_.profile.levels().size();
+  EXPECT_THAT(steps, testing::ElementsAre(one, 2 * one)) << "reference runs do not count";
+  EXPECT_EQ(std::ranges::count(said_.lines, "so far: two runs"), 1);
+}
+
 TEST_F(OrderedCampaign, JournalsWhatWasAskedAndAnswered) {
   campaign_ = campaign("0", 1, "");
   prepare();

@@ -80,6 +80,14 @@ TEST_F(LiveProgressOf, PassesOnWhatAPersonIsAsked) {
   EXPECT_THAT(told_.questions, ElementsAre("Mount 45°, then type 45.", ""));
 }
 
+TEST_F(LiveProgressOf, PassesOnWhatIsKnownSoFar) {
+  progress_.reached("so far K_T ± 0.05 %");
+  EXPECT_THAT(told_.lines, ElementsAre("so far K_T ± 0.05 %")) << "the terminal keeps the line";
+  const std::vector<json> told = messages();
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0], json({{"type", "reached"}, {"text", "so far K_T ± 0.05 %"}}));
+}
+
 TEST_F(LiveProgressOf, ShowsTheNewestTickWithItsLimits) {
   seen_.judged[Watched::supply_current] = 7;
   seen_.judged[Watched::thrust] = 1.5;

@@ -71,7 +71,7 @@ TEST(Choices, SayWhichTermForbidsAWish) {
   EXPECT_TRUE(found.choices.empty());
   EXPECT_THAT(found.unreachable[0].because, HasSubstr("cell calibration"));
   EXPECT_GT(found.unreachable[0].best, 0.0039);
-  EXPECT_THAT(answer_text(asked, found), HasSubstr("K_T 0.100 %: not to be reached here"));
+  EXPECT_THAT(answer_text(asked, found), HasSubstr("K_T 0.10 %: not to be reached here"));
 }
 
 TEST(Choices, WithoutAWishTellOfTheCampaignAsItIs) {

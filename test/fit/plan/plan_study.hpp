@@ -163,7 +163,7 @@ inline StandNoise piloted(const SimulatedStand& stand, int n, std::uint64_t seed
     options.mounted_once = stand.mounting == 0;
     fitted.push_back(analysed(identify(simulate(campaign, stand, seed + static_cast<std::uint64_t>(i)), options)));
   }
-  std::vector<Pilot> pilots;
+  std::vector<PilotCampaign> pilots;
   for (const Fitted& one : fitted) pilots.push_back({one, campaign.zero.value(), stand.mounting == 0});
   return noise_of(pilots);
 }

@@ -71,13 +71,13 @@ TEST(StandNoise, IsStatedByName) {
 
 TEST(StandNoise, NeedsARepetition) {
   const Fitted once = analysed(identify(simulate(planned_campaign({0, 90, 180, 270}, 1), stands()[0], 1)));
-  const Pilot pilot{once, 2, false};
+  const PilotCampaign pilot{once, 2, false};
   EXPECT_THROW((void)noise_of(std::span(&pilot, 1)), ConfigurationError);
 }
 
 TEST(StandNoise, DoesNotMixPilotsThatWereMountedDifferently) {
   const Fitted one = analysed(identify(simulate(planned_campaign(), stands()[0], 1)));
-  const std::vector<Pilot> pilots{{one, 2, true}, {one, 2, false}};
+  const std::vector<PilotCampaign> pilots{{one, 2, true}, {one, 2, false}};
   EXPECT_THROW((void)noise_of(pilots), ConfigurationError);
 }
 

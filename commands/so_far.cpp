@@ -1,0 +1,15 @@
+#include "commands/so_far.hpp"
+
+#include "fit/plan/outlook.hpp"
+
+namespace kphi::commands {
+
+daq::SoFar so_far(const profiles::Campaign& campaign, const std::vector<std::string>& wishes) {
+  std::vector<fit::Wish> wanted;
+  for (const std::string& text : wishes) wanted.push_back(fit::parse_wish(text));
+  return [&campaign, wanted](std::span<const results::StepMean> steps) {
+    return fit::to_words(fit::reached_so_far(steps, campaign, {}, wanted));
+  };
+}
+
+}  // namespace kphi::commands
