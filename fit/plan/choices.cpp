@@ -142,15 +142,21 @@ std::string occlusion_words(const Campaign& campaign) {
 
 std::string percent(double share) { return std::isfinite(share) ? in_percent(share) + " %" : "none"; }
 
-std::string choice_line(const std::string& name, const Choice& choice) {
+/// Of all choices, so that a table is as wide as it must be.
+std::size_t widest_occlusions(const PlanAnswer& answer) {
+  std::size_t width = occlusion_words(answer.as_written.campaign).size();
+  for (const Choice& choice : answer.choices) width = std::max(width, occlusion_words(choice.campaign).size());
+  return width;
+}
+
+std::string choice_line(const std::string& name, const Choice& choice, std::size_t occlusions_width) {
   const Campaign& one = choice.campaign;
-  std::string line =
-      fmt::format("{:<8} {:>7.1f} {:>9} {:>4} {:>5.2f} GB  {:>2} x {:<18} {:<7} {:>3} x {:<4g}s {:>4g} s", name,
-                  choice.minutes(), choice.mountings, choice.runs, 1e-9 * static_cast<double>(choice.bytes),
-                  one.repetitions, occlusion_words(one), one.order.remount_each_repetition ? "remount" : "",
-                  one.profile.steps, one.profile.dwell.value(), one.zero.value());
-  for (const Budget& budget : choice.told) line += fmt::format(" {:>10}", percent(share_of(budget)));
-  return line + fmt::format(" {:>9}\n", percent(choice.bend_seen));
+  std::string line = fmt::format(
+      "{:<7} {:>6.1f} {:>6} {:>4} {:>5.2f}  {} x {:<{}} {:>3} x {:<6} {:>5}", name, choice.minutes(), choice.mountings,
+      choice.runs, 1e-9 * static_cast<double>(choice.bytes), one.repetitions, occlusion_words(one), occlusions_width,
+      one.profile.steps, fmt::format("{:g} s", one.profile.dwell.value()), fmt::format("{:g} s", one.zero.value()));
+  for (const Budget& budget : choice.told) line += fmt::format(" {:>9}", percent(share_of(budget)));
+  return line + fmt::format(" {:>7}\n", percent(choice.bend_seen));
 }
 
 Json to_json(const Choice& choice) {
@@ -219,20 +225,22 @@ PlanAnswer answer(const PlanQuestion& question) {
 }
 
 std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) {
-  std::string text = fmt::format("{:<8} {:>7} {:>9} {:>4} {:>8}  {:<23} {:<7} {:<10} {:>6}", "", "minutes", "mountings",
-                                 "runs", "disk", "occlusions, °", "", "speeds", "zero");
-  for (const Wanted& wanted : answer.told) text += fmt::format(" {:>10}", wanted.name() + " ±");
-  text += fmt::format(" {:>9}\n", "bend seen");
-  text += choice_line("written", answer.as_written);
+  const std::size_t width = widest_occlusions(answer);
+  std::string text = fmt::format("{:<7} {:>6} {:>6} {:>4} {:>5}  {:<{}} {:<12} {:>5}", "", "min", "mounts", "runs",
+                                 "GB", "occlusions, °", width + 4, "speeds", "zero");
+  for (const Wanted& wanted : answer.told) text += fmt::format(" {:>9}", wanted.name() + " ±");
+  text += fmt::format(" {:>7}\n", "bend");
+  text += choice_line("written", answer.as_written, width);
   for (std::size_t i = 0; i < answer.choices.size(); ++i)
-    text += choice_line(fmt::format("{}", i + 1), answer.choices[i]);
+    text += choice_line(fmt::format("{}", i + 1), answer.choices[i], width);
   text += fmt::format(
-      "\n± is half of the expected 95 % interval; minutes with {:g} for each mounting; a bend of k(φ) of "
-      "that share of K_T is found in 95 of 100 campaigns\n",
+      "\n±     half of the expected 95 % interval\nmin   with {:g} for each mounting; as many mounts as runs: each run "
+      "is "
+      "mounted anew\nbend  of k(φ), share of K_T, that the test of the line finds in about 19 of 20 campaigns\n",
       question.minutes_per_mounting);
   for (std::size_t i = 0; i < answer.told.size(); ++i)
     text +=
-        fmt::format("{:<10} as written limited by {}\n", answer.told[i].name(), row_words(answer.as_written.told[i]));
+        fmt::format("{:<5} as written is limited by {}\n", answer.told[i].name(), row_words(answer.as_written.told[i]));
   std::set<std::string> unknown;
   for (const std::string& name : answer.as_written.told.front().not_known()) unknown.insert(name);
   if (!unknown.empty()) text += fmt::format("unknown and not in it: {} (see --u)\n", fmt::join(unknown, ", "));

@@ -11,6 +11,7 @@
 #include "base/csv.hpp"
 #include "base/error.hpp"
 #include "fit/model/run_differences.hpp"
+#include "fit/plan/memory.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -39,31 +40,6 @@ const std::array<Entry, 17> kEntries{{{"noise-n", &StandNoise::noise_n},
                                       {"k-t", &StandNoise::K_T},
                                       {"intercept", &StandNoise::intercept},
                                       {"slope-per-deg", &StandNoise::slope_per_deg}}};
-
-/// Variance of the mean over `window_s` of noise whose correlation falls as exp(-t/τ), for unit intensity: 1/window
-/// where τ is short.
-double averaged(double window_s, double memory_s) {
-  if (!(memory_s > 0)) return 1 / window_s;
-  const double share = memory_s / window_s;
-  return (1 - share * (1 - std::exp(-1 / share))) / window_s;
-}
-
-/// Correlation of the means over windows of neighbouring steps, whose begins are `apart_s` apart.
-double neighbours(double window_s, double apart_s, double memory_s) {
-  const double share = memory_s / window_s, within = 1 - std::exp(-1 / share);
-  return share * within * within * std::exp(-(apart_s - window_s) / memory_s) / (2 * (1 - share * within));
-}
-
-/// The correlation time that makes neighbouring steps as alike as this; what is not seen to be alike forgets within a
-/// window.
-double memory_for(double correlation, double window_s, double apart_s) {
-  double low = 1e-3, high = StandNoise::kEndless;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = std::sqrt(low * high);
-    (neighbours(window_s, apart_s, middle) < correlation ? low : high) = middle;
-  }
-  return std::max(low, window_s / 4);
-}
 
 /// a² + (b T)² through two groups of steps, slow and fast.
 struct Variance {
@@ -177,7 +153,7 @@ void take_steps(const Fitted& fitted, double moved_n, StandNoise& noise) {
     slow += (std::max(0.0, beyond.constant) + beyond.share * each.thrust_n * each.thrust_n) / n;
   }
   const double apart = noise.settle_s + window;
-  if (slow > 0) noise.slow_memory_s = memory_for(found.neighbours_n2 / found.weight / slow, window, apart);
+  if (slow > 0) noise.slow_memory_s = memory_of_neighbours(found.neighbours_n2 / found.weight / slow, window, apart);
   const double to_a_second = averaged(1, noise.slow_memory_s) / averaged(window, noise.slow_memory_s);
   noise.slow_n = std::sqrt(std::max(0.0, beyond.constant) * to_a_second);
   noise.slow_share = std::sqrt(std::max(0.0, beyond.share) * to_a_second);

@@ -10,23 +10,24 @@
 #include <utility>
 #include <vector>
 
+#include "fit/plan/memory.hpp"
 #include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
 
 struct StandNoise {
-  static constexpr double kEndless = 1e4;  ///< s, longer than anything here
   // Standard deviation of the mean thrust of a step: constant and in proportion to the thrust.
-  double noise_n = 0;               ///< averaged over 1 s, N; a longer window makes it smaller
-  double noise_share = 0;           ///< of the thrust, over 1 s
-  double memory_s = 0;              ///< correlation time of that noise; 0: none
-  double slow_n = 0;                ///< beyond what the samples of a step tell of it, over 1 s, N
-  double slow_share = 0;            ///< of the thrust, over 1 s
-  double slow_memory_s = kEndless;  ///< correlation time of that; endless: a longer window does not make it smaller
-  double settle_s = 1;              ///< from the command of a step to the begin of its window
-  double zero_n = 0;                ///< of the mean of a run's two zeros, 1 s each, by their samples, standard, N
-  double zero_walk_n = 0;           ///< how far the zero moves in a minute, standard deviation, N
-  double runs = 0;                  ///< from run to run beyond noise and zero, standard deviation, share of k
+  double noise_n = 0;      ///< averaged over 1 s, N; a longer window makes it smaller
+  double noise_share = 0;  ///< of the thrust, over 1 s
+  double memory_s = 0;     ///< correlation time of that noise; 0: none
+  double slow_n = 0;       ///< beyond what the samples of a step tell of it, over 1 s, N
+  double slow_share = 0;   ///< of the thrust, over 1 s
+  double slow_memory_s =
+      kEndlessMemory;      ///< correlation time of that; endless: a longer window does not make it smaller
+  double settle_s = 1;     ///< from the command of a step to the begin of its window
+  double zero_n = 0;       ///< of the mean of a run's two zeros, 1 s each, by their samples, standard, N
+  double zero_walk_n = 0;  ///< how far the zero moves in a minute, standard deviation, N
+  double runs = 0;         ///< from run to run beyond noise and zero, standard deviation, share of k
   double runs_freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind `runs`
   std::optional<double> mounting{};  ///< from mounting to mounting, share of k; nullopt: unknown
   double campaigns = 0;              ///< from campaign to campaign, common to all k, share

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <poll.h>
 
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
@@ -207,6 +208,8 @@ TEST_F(LiveServer, IsNotBlockedByConnectionsThatAskNothing) {
       EXPECT_THAT(get(kPage), StartsWith("HTTP/1.1 200")) << i;
     }
   }
+  pollfd oldest{idle.front().native_handle(), POLLIN, 0};
+  ASSERT_EQ(::poll(&oldest, 1, 10'000), 1) << "the oldest gave way";
   char byte = 0;
   error_code closed;
   (void)asio::read(idle.front(), asio::buffer(&byte, 1), closed);

@@ -79,7 +79,8 @@ TEST(Choices, WithoutAWishTellOfTheCampaignAsItIs) {
   const PlanAnswer found = answer(asked);
   EXPECT_TRUE(found.choices.empty());
   const std::string text = answer_text(asked, found);
-  for (const char* part : {"K_T ±", "slope ±", "k(135) ±", "written", "limited by mounting", "31.0", "0 45 90 180 270"})
+  for (const char* part :
+       {"K_T ±", "slope ±", "k(135) ±", "written", "limited by mounting", "31.0", "3 x 0 45 90 180 270"})
     EXPECT_THAT(text, HasSubstr(part));
   const auto json = nlohmann::json::parse(answer_json(asked, found));
   EXPECT_EQ(json["as_written"]["runs"], 15);
