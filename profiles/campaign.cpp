@@ -36,6 +36,27 @@ void check_occlusions(ProfileReader& file, const std::vector<double>& occlusions
   }
 }
 
+bool has_range(const ProfileReader& file) { return file.has("/profile/dwell_s/0"); }
+std::string shortest_dwell(const ProfileReader& file) {
+  return has_range(file) ? "/profile/dwell_s/0" : "/profile/dwell_s";
+}
+std::string longest_dwell(const ProfileReader& file) {
+  return has_range(file) ? "/profile/dwell_s/1" : "/profile/dwell_s";
+}
+
+/// `until` and a range of dwell_s belong together.
+void read_until(ProfileReader& file, StepProfile& profile) {
+  const auto percent = file.find<double>("/profile/until/k_percent");
+  if (percent) profile.until = Until{*percent / 100, Seconds(file.number(shortest_dwell(file)))};
+  if (percent && !has_range(file))
+    file.refuse("/profile/dwell_s", "with until, a step lasts between two times",
+                "write dwell_s: [least, most], such as [0.7, 4]");
+  if (!percent && has_range(file))
+    file.refuse("/profile/dwell_s", "a range without until", "add until: {k_percent: 0.2}, or give one time");
+  if (has_range(file))
+    file.require_above("/profile/dwell_s/1", "/profile/dwell_s/0", " s", "write the shorter time first");
+}
+
 Order read_order(ProfileReader& file) {
   Order order;
   order.runs = file.get_or("/order/runs", order.runs);
@@ -73,8 +94,9 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.repetitions = file.get_or<int>("/repetitions", campaign.repetitions);
   campaign.repetitions_extra_max = file.get_or<int>("/repetitions_extra_max", campaign.repetitions_extra_max);
   campaign.order = read_order(file);
-  campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number("/profile/dwell_s")),
+  campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number(longest_dwell(file))),
                       from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
+  read_until(file, campaign.profile);
   if (const auto rpm_s = file.find<double>("/profile/slew_rpm_s"))
     campaign.profile.slew_rad_s2 = from_rpm(*rpm_s).value();
   campaign.zero = Seconds(file.number("/zero_s"));
@@ -85,7 +107,7 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.text = text;
   campaign.path = path;
   check_speeds(file);
-  file.require_above("/profile/dwell_s", "/minimum_discard_s", " s", "dwell longer, or nothing is left to average");
+  file.require_above(shortest_dwell(file), "/minimum_discard_s", " s", "dwell longer, or nothing is left to average");
   check_occlusions(file, campaign.occlusions_deg);
   file.finish();
   return campaign;

@@ -35,16 +35,29 @@ struct Propeller {
   int blades = 0;
 };
 
-/// Commanded speeds of one run, held `dwell` each. The levels are evenly spaced and include both ends.
+/// A step ends before its time once it has settled and its mean is certain enough.
+struct Until {
+  double k_share = 0;   ///< half of the 95 % interval of the k of a run, as a share of it
+  Seconds dwell_least;  ///< no step ends before
+};
+
+/// Commanded speeds of one run, held `dwell` each, with `until` at most so long. The levels are evenly spaced and
+/// include both ends.
 struct StepProfile {
   int steps = 0;
   Seconds dwell;
   RadPerSec first;
   RadPerSec last;
+  std::optional<Until> until{};         ///< nullopt: every step is held to its end
   std::optional<double> slew_rad_s2{};  ///< limit of the commanded acceleration; nullopt: steps
   /// All levels, ascending or descending, `steps` of them.
   [[nodiscard]] std::vector<RadPerSec> levels() const;
 };
+
+/// The shortest time that a step is held.
+[[nodiscard]] inline Seconds shortest_dwell(const StepProfile& profile) {
+  return profile.until ? profile.until->dwell_least : profile.dwell;
+}
 
 struct Campaign {
   std::string name;

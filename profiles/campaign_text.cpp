@@ -94,6 +94,7 @@ std::string changed_text(const Campaign& campaign, const Campaign& wanted) {
   const Campaign read = parse_campaign(editor.text(), campaign.path);
   if (read.occlusions_deg != wanted.occlusions_deg || read.repetitions != wanted.repetitions ||
       read.order.remount_each_repetition != wanted.order.remount_each_repetition ||
+      read.profile.until.has_value() != wanted.profile.until.has_value() ||
       read.profile.steps != wanted.profile.steps || read.profile.dwell.value() != wanted.profile.dwell.value() ||
       read.zero.value() != wanted.zero.value())
     throw ConfigurationError(campaign.path +

@@ -98,7 +98,7 @@ netbox::Intention intention_of(const profiles::Campaign& campaign, const profile
   intention.rate_hz = config.netbox.rate_hz;
   intention.records_per_datagram = config.netbox.records_per_datagram;
   // A line with less than one period in the shortest averaging window (bin_statistics.hpp) would bias the mean.
-  const double left_s = (campaign.profile.dwell - campaign.minimum_discard).value();
+  const double left_s = (shortest_dwell(campaign.profile) - campaign.minimum_discard).value();
   if (left_s > 0)
     intention.alias_limit_hz = std::max(intention.alias_limit_hz, 1 / std::min(results::kLeastWindow, left_s / 2));
   return intention;

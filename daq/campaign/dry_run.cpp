@@ -104,7 +104,7 @@ class Checks {
   }
 
   void window() {
-    const double left = campaign_.profile.dwell.value() - campaign_.minimum_discard.value();
+    const double left = shortest_dwell(campaign_.profile).value() - campaign_.minimum_discard.value();
     const std::string words = fmt::format("{:g} s of each step averaged after minimum_discard_s, zeros of {:g} s", left,
                                           campaign_.zero.value());
     warn_if(left < results::kLeastWindow, "averages", words,
@@ -305,11 +305,13 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
   for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
   return fmt::format(
       "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
-      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {:g} s each; {} mountings\n"
-      "  {} spinning, {} on the bench{}, {:.1f} million samples, {}",
+      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {} each; {} mountings\n"
+      "  {}{} spinning, {} on the bench{}, {:.1f} million samples, {}",
       campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
-      plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last), profile.dwell.value(),
-      plan.mountings, minutes(plan.spinning.value()), minutes(plan.bench.value()),
+      plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last),
+      profile.until ? fmt::format("{:g} to {:g} s", profile.until->dwell_least.value(), profile.dwell.value())
+                    : fmt::format("{:g} s", profile.dwell.value()),
+      plan.mountings, profile.until ? "at most " : "", minutes(plan.spinning.value()), minutes(plan.bench.value()),
       time_scale(config) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(config)) : "",
       1e-6 * static_cast<double>(plan.samples), gigabytes(bytes_needed(plan, config)));
 }

@@ -48,7 +48,7 @@ void Recorder::drain_marks() {
   while (marks_.pop(mark)) {
     writer_.mark(mark);
     measuring_ = mark.phase == results::Phase::bias_before || mark.phase == results::Phase::bias_after ||
-                 mark.phase == results::Phase::zero_before;
+                 mark.phase == results::Phase::zero_before || mark.phase == results::Phase::step;
     estimate_ = {};
   }
 }

@@ -28,7 +28,8 @@ class Recorder {
   [[nodiscard]] std::vector<StreamEvent> take_events() { return take_all(events_); }
   /// Records an event of the runner. Call it only after the last drain().
   void note(const StreamEvent& event);
-  /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before.
+  /// Mean and standard deviation of all axes over the present phase, if it measures a bias or the zero before, or holds
+  /// a step; of the phase before it until the first record of this one was drained.
   [[nodiscard]] netbox::ZeroMeasurement measured() const noexcept { return measured_.read(); }
   /// Rethrows the first error of drain().
   void check_failure();

@@ -11,6 +11,7 @@
 #include "daq/guard/rest_guard.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/speed_cap.hpp"
+#include "daq/run/step_watch.hpp"
 #include "results/reduction/quality_flags.hpp"
 
 namespace kphi::daq {
@@ -55,6 +56,7 @@ void Sequence::run() {
   hold_zero(Phase::zero_before);
   require_rest();
   guard_.take_zero(recorder_.measured().mean);
+  zero_n_ = recorder_.measured().mean[static_cast<std::size_t>(order_.config.thrust_axis)];
   spin();
   wait_for_standstill();
   hold_zero(Phase::zero_after);
@@ -237,8 +239,33 @@ void Sequence::hold_step(const profiles::PlannedStep& step, MotorEnable& spin) {
   change_speed();
   spin.at(step.speed);
   mark(Phase::step, step.number, step.speed);
-  hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
+  const auto& profile = order_.campaign.profile;
+  if (profile.until)
+    hold_until(*profile.until, step, spin);
+  else
+    hold(from_seconds(profile.dwell.value()), &spin);
   progress_.step_done(position_, seen_);
+}
+
+void Sequence::hold_until(const profiles::Until& until, const profiles::PlannedStep& step, MotorEnable& spin) {
+  const double most_s = order_.campaign.profile.dwell.value();
+  const auto axis = static_cast<std::size_t>(order_.config.thrust_axis);
+  StepWatch watch(order_.campaign.minimum_discard.value(), most_s);
+  double squares = 0;
+  for (const profiles::PlannedStep& each : order_.planned.steps) squares += std::pow(each.speed.value(), 4);
+  const double x = step.speed.value() * step.speed.value();
+  const Instant begin = bench_.clock().now();
+  const Duration tick_length = bench_.clock().stretched(kTickWall);
+  for (double since = 0; since < most_s; since = to_seconds(bench_.clock().now() - begin)) {
+    hold(std::min(tick_length, from_seconds(most_s - since)), &spin);
+    const netbox::ZeroMeasurement measured = recorder_.measured();
+    watch.add(to_seconds(bench_.clock().now() - begin), measured.records, measured.mean[axis]);
+    if (to_seconds(bench_.clock().now() - begin) < until.dwell_least.value()) continue;
+    const auto [mean_n, u_n] = watch.known();
+    const double enough = good_enough_n(until.k_share, mean_n - zero_n_, x, squares, order_.planned.steps.size());
+    if (u_n <= enough) break;  // false while one of them is unknown
+  }
+  end_ -= from_seconds(std::max(0.0, most_s - to_seconds(bench_.clock().now() - begin)));
 }
 
 void Sequence::learn_from(const profiles::PlannedStep& step) {

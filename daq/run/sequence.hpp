@@ -63,6 +63,8 @@ class Sequence {
   /// As the steering wants, no faster than the campaign's slew.
   void follow(Steering& steering, MotorEnable& spin);
   void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
+  /// To its end, or until it is certain enough.
+  void hold_until(const profiles::Until& until, const profiles::PlannedStep& step, MotorEnable& spin);
   /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
   void learn_from(const profiles::PlannedStep& step);
   void mark(results::Phase phase, int step = -1, RadPerSec commanded = RadPerSec(0));
@@ -85,6 +87,7 @@ class Sequence {
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
+  double zero_n_ = 0;  ///< of the thrust axis, as the box shows it
   Instant end_{};
   int events_shown_ = 0;
   std::string stalled_;  ///< the event that says that the box's measurement stalled; empty while it measures

@@ -41,6 +41,7 @@ std::vector<std::vector<double>> occlusion_sets(std::vector<double> all) {
 }
 
 std::vector<double> dwells(const PlanQuestion& question) {
+  if (question.campaign.profile.until) return {question.campaign.profile.dwell.value()};  // it sets them itself
   std::set<double> all{question.campaign.profile.dwell.value()};
   const double first = std::max(question.noise.settle_s, question.campaign.minimum_discard.value());
   for (const double window : {results::kLeastWindow, 0.75, 1.0, 1.5, 2.0, 3.0})
@@ -57,7 +58,7 @@ std::vector<int> step_numbers(const Campaign& campaign) {
 Choice cost_of(const PlanQuestion& question, const Campaign& campaign) {
   Choice choice;
   choice.campaign = campaign;
-  const profiles::Plan plan = profiles::make_plan(campaign, question.bench);
+  const profiles::Plan plan = profiles::make_plan(as_expected(campaign, question.noise), question.bench);
   choice.bench_min = plan.bench.value() / 60;
   choice.mountings = plan.mountings;
   choice.mounting_min = question.minutes_per_mounting * plan.mountings;
@@ -105,8 +106,9 @@ std::vector<Candidate> candidates(const PlanQuestion& question) {
               campaign.profile.steps = steps;
               campaign.profile.dwell = Seconds(dwell);
               campaign.zero = Seconds(zero);
+              const double held_s = as_expected(campaign, question.noise).profile.dwell.value();
               const double run_s =
-                  steps * dwell * (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
+                  steps * held_s * (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
                   (campaign.box_bias ? 4 : 2) * zero;
               all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
             }

@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "fit/model/step_selection.hpp"
 #include "profiles/plan.hpp"
+#include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
@@ -120,9 +121,19 @@ std::vector<Wanted> usual_wants(const profiles::Campaign& campaign) {
   return {{Wanted::Kind::thrust_coefficient, 0}, {Wanted::Kind::slope, 0}, {Wanted::Kind::k, widest / 2}};
 }
 
-Prediction::Prediction(const profiles::Campaign& campaign, const StandNoise& noise, const BenchUncertainty& bench,
+profiles::Campaign as_expected(profiles::Campaign campaign, const StandNoise& noise) {
+  auto& profile = campaign.profile;
+  if (!profile.until) return campaign;
+  const double settled_s = noise.settle_s + results::kLeastWindow;
+  profile.dwell = Seconds(std::clamp(settled_s, profile.until->dwell_least.value(), profile.dwell.value()));
+  profile.until.reset();
+  return campaign;
+}
+
+Prediction::Prediction(const profiles::Campaign& written, const StandNoise& noise, const BenchUncertainty& bench,
                        const CurveOptions& curve)
-    : noise_(noise), phis_(campaign.occlusions_deg) {
+    : noise_(noise), phis_(written.occlusions_deg) {
+  const profiles::Campaign campaign = as_expected(written, noise);
   std::ranges::sort(phis_);
   if (phis_.empty() || phis_.front() != 0)
     throw ConfigurationError("occlusions_deg has no 0: K_T is measured without an occlusion; add 0");

@@ -30,6 +30,9 @@ struct Wish {
 /// The numbers that are told where nobody wishes for one: K_T, slope, k at half of the widest occlusion.
 [[nodiscard]] std::vector<Wanted> usual_wants(const profiles::Campaign& campaign);
 
+/// With steps that end by themselves (until): the campaign whose steps last as long as they are expected to.
+[[nodiscard]] profiles::Campaign as_expected(profiles::Campaign campaign, const StandNoise& noise);
+
 class Prediction {
  public:
   /// `bench`: errors that no repetition shows; unknown ones are left out, as in a fit. Throws ConfigurationError where

@@ -109,6 +109,18 @@ TEST(Campaign, EachMistakeEarnsItsRefusal) {
         "15:13: profile.last_rpm: 25000 is above 19100 RPM (limits.speed_max_rpm); lower it, or raise "
         "the limit if propeller and motor tolerate it"},
        {"first_rpm: 100", "first_rpm: 19101", "14:14: profile.first_rpm: 19101 is above…"},
+       // A range of dwells and what ends a step belong together
+       {"dwell_s: 2.0", "dwell_s: [0.7, 4]\n  until: {k_percent: 0.2}", ""},
+       {"dwell_s: 2.0", "dwell_s: [0.7, 4]",
+        "13:12: profile.dwell_s: a range without until; add until: {k_percent: 0.2}, or give one time"},
+       {"dwell_s: 2.0", "dwell_s: 2.0\n  until: {k_percent: 0.2}",
+        "13:12: profile.dwell_s: with until, a step lasts between two times; write dwell_s: [least, most], such as "
+        "[0.7, 4]"},
+       {"dwell_s: 2.0", "dwell_s: [4, 0.7]\n  until: {k_percent: 0.2}",
+        "13:16: profile.dwell_s[1]: 0.7 is not above 4 s (profile.dwell_s[0]); write the shorter time first"},
+       {"dwell_s: 2.0", "dwell_s: [0.4, 4]\n  until: {k_percent: 0.2}",
+        "13:13: profile.dwell_s[0]: 0.4 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing is left to "
+        "average"},
        // Refuses dwells that leave nothing to average
        {"dwell_s: 2.0", "dwell_s: 0.5",
         "13:12: profile.dwell_s: 0.5 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing "
@@ -177,13 +189,13 @@ TEST(Campaign, EachMistakeEarnsItsRefusal) {
         "15:3: last is not a key of profile; the unit is part of the key: write last_rpm and the value "
         "in RPM"},
        {"dwell_s: 2.0", "dwell_s: 2 s",
-        "13:12: profile.dwell_s: expected a number, found text \"2 s\"; write the number alone, in s"},
+        "13:12: profile.dwell_s: text \"2 s\" does not fit; write the seconds alone, or [least, most] with until"},
        // Says where a key belongs
        {"zero_s: 3.0\n", "zero_s: 3.0\nthrust_max_n: 3\n", "17:1: thrust_max_n is not a key; it belongs to limits"},
        {"  steps: 4\n", "  steps: 4\n  zero_s: 3\n",
         "13:3: zero_s is not a key of profile; it belongs to the top of the file"},
        {"  steps: 4\n", "  steps: 4\n  colour: red\n",
-        "13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps"}});
+        "13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps, until"}});
 }
 
 struct Range {

@@ -274,6 +274,38 @@ TEST_F(OrderedCampaign, WaitsBetweenRunsUntilTheCoilHasCooledDown) {
   EXPECT_GE(apart_s, paused_s) << "nothing was driven meanwhile";
 }
 
+// Settled, and certain enough, after half a second behind the discard; the same k in a fraction of the time.
+TEST_F(OrderedCampaign, EndsStepsThatAreCertainEnoughBeforeTheirTime) {
+  const auto text = campaign("0", 1, "").text;
+  const auto with = [&](const std::string& dwell) {
+    std::string changed = text;
+    changed.replace(changed.find("dwell_s: 1.4"), 12, dwell);
+    changed.replace(changed.find("minimum_discard_s: 0.6"), 22, "minimum_discard_s: 0.3");
+    return profiles::parse_campaign(changed, "until.yaml");
+  };
+  const auto held_s = [&] {
+    std::vector<double> held;
+    const auto phases = recording(0).phases;
+    for (std::size_t i = 0; i + 1 < phases.size(); ++i)
+      if (phases[i].phase == results::Phase::step)
+        held.push_back(1e-9 * static_cast<double>(phases[i + 1].time_ns - phases[i].time_ns));
+    return held;
+  };
+  (void)run(with("dwell_s: [0.9, 4], until: {k_percent: 0.5}"));
+  ASSERT_EQ(held_s().size(), 4u);
+  for (const double held : held_s()) {
+    EXPECT_GE(held, 0.9);
+    EXPECT_LT(held, 2);
+  }
+  for (const auto& step : steps()) {
+    EXPECT_EQ(step.quality_flags, 0u);
+    EXPECT_NEAR(step.thrust_n / (step.speed_rad_s * step.speed_rad_s), 1.55e-6, 0.02e-6);
+  }
+  expect_whole();
+  (void)run(with("dwell_s: [0.9, 1.5], until: {k_percent: 0.01}"));
+  for (const double held : held_s()) EXPECT_NEAR(held, 1.5, 0.02) << "never certain enough: held to its end";
+}
+
 TEST_F(OrderedCampaign, TellsAfterEachRunWhatIsKnownSoFar) {
   campaign_ = campaign("0", 2, "order: {reference: true}\n");
   prepare();

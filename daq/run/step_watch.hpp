@@ -1,0 +1,39 @@
+// Watches the thrust of a step while it is held: whether it has settled, and how certain its mean is already.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace kphi::daq {
+
+/// The runner's thread. By the same functions as the reduction: settle() and mean_error().
+class StepWatch {
+ public:
+  /// `discard_s` at the begin of the step is not averaged; it lasts `most_s` at most.
+  StepWatch(double discard_s, double most_s) : discard_s_(discard_s), most_s_(most_s) {}
+
+  /// Of the records since the step's begin: their number and their mean thrust, N. `since_s`: time since then. The
+  /// first may be those of the phase before: their number falls when the step's own come.
+  void add(double since_s, std::uint64_t records, double mean_n);
+  /// Mean thrust of the settled part, and its standard uncertainty, N; NaN while it is not settled.
+  struct Known {
+    double mean_n, u_n;
+  };
+  [[nodiscard]] Known known() const;
+
+ private:
+  static constexpr double kBin = 0.02;  ///< s, at least
+  double discard_s_, most_s_;
+  std::vector<double> bins_;
+  double begun_s_ = 0;  ///< of the bin that is being filled
+  double sum_ = 0;      ///< of all records up to there, N
+  std::uint64_t records_ = 0;
+};
+
+/// Standard uncertainty of the mean thrust of a step, N, that is good enough for k of its run to be known to `k_share`
+/// (half of a 95 % interval), if noise may take half of it and every step an equal part. `thrust_n` at `x` = ω²;
+/// `squares`: Σ x² over the `steps` of the run.
+[[nodiscard]] double good_enough_n(double k_share, double thrust_n, double x, double squares, std::size_t steps);
+
+}  // namespace kphi::daq
