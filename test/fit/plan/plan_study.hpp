@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -73,10 +75,28 @@ inline double true_k(const SimulatedStand& stand, double phi_deg, double share =
          (1 + stand.rise * (share - 0.5));
 }
 
-/// One run: zero, steps, zero.
-inline void simulate_run(const profiles::Campaign& campaign, const profiles::PlannedRun& planned,
-                         const SimulatedStand& stand, double share, Random& random,
-                         std::vector<results::StepMean>& steps) {
+/// A step as it was held: thrust and zero bin by bin, N, and how much of its begin is not averaged.
+struct HeldStep {
+  std::vector<double> bins_n;
+  double discard_s = 0;
+};
+/// Holds a step of this thrust, the zero before the run being `zero_n`.
+using Hold =
+    std::function<HeldStep(const profiles::PlannedStep& step, double thrust_n, double zero_n, StandInTime& time)>;
+
+/// To the end of the campaign's dwell.
+inline Hold to_its_end(const profiles::Campaign& campaign, const SimulatedStand& stand) {
+  return [&](const profiles::PlannedStep&, double thrust_n, double, StandInTime& time) {
+    HeldStep held{time.next(static_cast<int>(bins_in(campaign.profile.dwell.value()))), stand.settle_s};
+    for (double& bin : held.bins_n) bin += thrust_n;
+    return held;
+  };
+}
+
+/// One run: zero, steps, zero. Returns its length in seconds, without spinning down.
+inline double simulate_run(const profiles::Campaign& campaign, const profiles::PlannedRun& planned,
+                           const SimulatedStand& stand, double share, const Hold& hold, Random& random,
+                           std::vector<results::StepMean>& steps) {
   StandInTime time(stand, random);
   const std::size_t zero_bins = bins_in(campaign.zero.value());
   const results::MeanError before = results::mean_error(time.next(static_cast<int>(zero_bins)));
@@ -84,23 +104,22 @@ inline void simulate_run(const profiles::Campaign& campaign, const profiles::Pla
   const double top = from_rpm(19100).value();
   double now = campaign.zero.value();
   for (const profiles::PlannedStep& step : planned.steps) {
-    std::vector<double> bins = time.next(static_cast<int>(bins_in(campaign.profile.dwell.value())));
-    bins.erase(bins.begin(), bins.begin() + static_cast<std::ptrdiff_t>(bins_in(stand.settle_s)));
+    const double speed = step.speed.value(),
+                 thrust = share * true_k(stand, planned.occlusion_deg, speed / top) * speed * speed;
+    const HeldStep held = hold(step, thrust, before.mean, time);
+    const std::vector<double> bins(held.bins_n.begin() + static_cast<std::ptrdiff_t>(bins_in(held.discard_s)),
+                                   held.bins_n.end());
     const results::MeanError mean = results::mean_error(results::without_trend(bins), 2);
     results::StepMean one = step_at(planned.occlusion_deg, planned.repetition, step.number);
-    one.commanded_speed_rad_s = one.speed_rad_s = step.speed.value();
-    double sum = 0;
-    for (const double bin : bins) sum += bin / static_cast<double>(bins.size());
-    one.thrust_n = share * true_k(stand, planned.occlusion_deg, step.speed.value() / top) * step.speed.value() *
-                       step.speed.value() +
-                   sum;
+    one.commanded_speed_rad_s = one.speed_rad_s = speed;
+    one.thrust_n = std::accumulate(bins.begin(), bins.end(), 0.0) / static_cast<double>(bins.size());
     one.thrust_samples = bins.size() * 350;
     one.thrust_u_n = mean.u;
     one.thrust_n_eff = static_cast<double>(one.thrust_samples) / mean.correlation;
     one.thrust_freedom = mean.freedom;
-    one.discarded_s = stand.settle_s;
-    one.window_begin_s = now + stand.settle_s;
-    now += campaign.profile.dwell.value();
+    one.discarded_s = held.discard_s;
+    one.window_begin_s = now + held.discard_s;
+    now += static_cast<double>(held.bins_n.size()) * StandInTime::kBin;
     one.window_end_s = now;
     one.thrust_sd_n = 0.05;
     steps.push_back(one);
@@ -117,18 +136,26 @@ inline void simulate_run(const profiles::Campaign& campaign, const profiles::Pla
     steps[i].zero_u_n = std::hypot((1 - part) * before.u, part * after.u);
     steps[i].thrust_u_n = std::hypot(steps[i].thrust_u_n, steps[i].zero_u_n);
   }
+  return now + campaign.zero.value();
+}
+
+/// `bench_s`: how long the motor was on and zeros were taken.
+inline std::vector<results::StepMean> simulate(const profiles::Campaign& campaign, const SimulatedStand& stand,
+                                               std::uint64_t seed, const Hold& hold, double* bench_s = nullptr) {
+  Random random(seed);
+  std::vector<results::StepMean> steps;
+  double mounted = 1, lasted = 0;
+  for (const profiles::PlannedRun& run : profiles::make_plan(campaign, profiles::BenchConfig{}).runs) {
+    if (run.mount) mounted = 1 + stand.mounting * random.normal();
+    lasted += simulate_run(campaign, run, stand, mounted * (1 + stand.runs * random.normal()), hold, random, steps);
+  }
+  if (bench_s != nullptr) *bench_s += lasted;
+  return steps;
 }
 
 inline std::vector<results::StepMean> simulate(const profiles::Campaign& campaign, const SimulatedStand& stand,
                                                std::uint64_t seed) {
-  Random random(seed);
-  std::vector<results::StepMean> steps;
-  double mounted = 1;
-  for (const profiles::PlannedRun& run : profiles::make_plan(campaign, profiles::BenchConfig{}).runs) {
-    if (run.mount) mounted = 1 + stand.mounting * random.normal();
-    simulate_run(campaign, run, stand, mounted * (1 + stand.runs * random.normal()), random, steps);
-  }
-  return steps;
+  return simulate(campaign, stand, seed, to_its_end(campaign, stand));
 }
 
 /// The paper's campaign, changed.
