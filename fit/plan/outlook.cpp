@@ -38,18 +38,22 @@ std::optional<Reached> reached(const Wanted& wanted, const Fitted& fitted, const
   return result;
 }
 
+/// With steps that ended by themselves as long as they were.
+profiles::Campaign as_held(std::span<const results::StepMean> steps, profiles::Campaign campaign) {
+  if (!campaign.profile.until) return campaign;
+  double held_s = 0;
+  for (const results::StepMean& step : steps)
+    held_s += (step.window_end_s - step.window_begin_s + step.discarded_s) / static_cast<double>(steps.size());
+  if (held_s > 0) campaign.profile.dwell = Seconds(held_s);  // false where a step does not know it
+  campaign.profile.until.reset();
+  return campaign;
+}
+
 /// The campaign as far as it was run: repetitions that the widest occlusion has.
-profiles::Campaign as_run(const Identification& identification, profiles::Campaign campaign) {
+profiles::Campaign as_run(const Identification& identification, const profiles::Campaign& written) {
+  profiles::Campaign campaign = as_held(identification.selection.used, written);
   campaign.occlusions_deg.clear();
   campaign.repetitions = 1;
-  if (campaign.profile.until) {
-    double held_s = 0;
-    for (const results::StepMean& step : identification.selection.used)
-      held_s += (step.window_end_s - step.window_begin_s + step.discarded_s) /
-                static_cast<double>(identification.selection.used.size());
-    campaign.profile.dwell = Seconds(held_s);
-    campaign.profile.until.reset();
-  }
   for (const OcclusionCoefficient& row : identification.table) {
     campaign.occlusions_deg.push_back(row.phi_deg);
     campaign.repetitions = std::max(campaign.repetitions, static_cast<int>(row.repetitions));
@@ -148,7 +152,7 @@ Standing reached_so_far(std::span<const results::StepMean> steps, const profiles
   if (steps.empty()) return standing;
   std::set<std::pair<double, int>> runs;
   for (const results::StepMean& step : steps) runs.emplace(step.occlusion_deg, step.repetition);
-  const profiles::Plan plan = profiles::make_plan(campaign, {});  // with steps as long as they may be
+  const profiles::Plan plan = profiles::make_plan(as_held(steps, campaign), {});
   const double planned = static_cast<double>(plan.runs.size());
   standing.minutes_left = plan.bench.value() / 60 * std::max(0.0, 1 - static_cast<double>(runs.size()) / planned);
   try {

@@ -36,6 +36,14 @@ TEST(Outlook, SaysMoreWithEveryRun) {
   EXPECT_THAT(words_after(15), Not(HasSubstr("the plan ends"))) << "it has";
 }
 
+TEST(Outlook, OfStepsThatEndByThemselvesCountsThemAsTheyWere) {
+  profiles::Campaign campaign = planned_campaign();
+  const auto steps = first_runs(campaign, 9);  // of 2 s
+  campaign.profile.until = profiles::Until{0.002, Seconds(0.7)};
+  campaign.profile.dwell = Seconds(20);
+  EXPECT_THAT(to_words(reached_so_far(steps, campaign, {}, {})), HasSubstr(" in 8 min"));
+}
+
 TEST(Outlook, TellsHowFarItIsToAWish) {
   EXPECT_THAT(words_after(15, {"slope 5 %"}), HasSubstr("of 5.00 % wanted"));
   EXPECT_THAT(words_after(15, {"slope 5 %"}), Not(HasSubstr("more than planned")));
