@@ -10,12 +10,16 @@ namespace kphi::daq {
 
 void StepWatch::add(double since_s, std::uint64_t records, double mean_n) {
   if (records < records_) *this = StepWatch(discard_s_, most_s_);  // what came before was of the phase before
-  if (records <= records_ || since_s < begun_s_ + kBin) return;
+  if (records <= records_ || since_s < begun_s_ + bin_s_) return;
   const double sum = static_cast<double>(records) * mean_n;
   bins_.push_back((sum - sum_) / static_cast<double>(records - records_));
   sum_ = sum;
   records_ = records;
   begun_s_ = since_s;
+  if (bins_.size() < kMostBins) return;
+  for (std::size_t i = 0; i < kMostBins / 2; ++i) bins_[i] = 0.5 * (bins_[2 * i] + bins_[2 * i + 1]);
+  bins_.resize(kMostBins / 2);
+  bin_s_ *= 2;
 }
 
 namespace {

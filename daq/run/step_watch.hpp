@@ -23,8 +23,9 @@ class StepWatch {
   [[nodiscard]] Known known() const;
 
  private:
-  static constexpr double kBin = 0.02;  ///< s, at least
+  static constexpr std::size_t kMostBins = 512;  ///< known() is asked on every tick and must return at once
   double discard_s_, most_s_;
+  double bin_s_ = 0.02;  ///< at least; twice as long whenever there are kMostBins
   std::vector<double> bins_;
   double begun_s_ = 0;  ///< of the bin that is being filled
   double sum_ = 0;      ///< of all records up to there, N

@@ -52,6 +52,17 @@ TEST(StepWatch, HoldsALoudStepLonger) {
   EXPECT_GT(long_one, short_one + 0.5) << "0.006 N at 1 s";
 }
 
+// On every tick of a step of ten minutes, beside the guard's limit of 0.4 s for a pause of the program.
+TEST(StepWatch, OfALongStepIsAsQuickAsOfAShortOne) {
+  StepWatch watch(0.2, 600);
+  EXPECT_EQ(ends_at(
+                watch, [](double) { return 3.0; }, 0.03, 0, 600),
+            0)
+      << "never that certain";
+  EXPECT_NEAR(watch.known().mean_n, 3, 1e-3);
+  EXPECT_LT(watch.known().u_n, 1e-4) << "all of it counts";
+}
+
 TEST(StepWatch, DoesNotKnowWhatStillDrifts) {
   StepWatch watch(0.2, 4);
   EXPECT_EQ(ends_at(
