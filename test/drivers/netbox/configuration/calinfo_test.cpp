@@ -1,6 +1,14 @@
 #include "drivers/netbox/configuration/calinfo.hpp"
 
 #include <gmock/gmock.h>
+#include <linux/sockios.h>
+#include <netinet/in.h>
+#include <sys/ioctl.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <thread>
 
 #include "test/drivers/netbox/fake_box.hpp"
 #include "test/refusal.hpp"
@@ -18,6 +26,27 @@ Configuration si_box() {
   Configuration configuration;
   configuration.counts_per_newton = configuration.counts_per_newton_metre = 1e6;
   return configuration;
+}
+
+/// Whether bytes sent over this loopback connection wait in the kernel: unacknowledged here, or unread at the other
+/// end, whose queue the kernel's table shows. False once the other end has closed.
+bool is_unread(int connection) {
+  int unacknowledged = 0;
+  sockaddr_in own{}, peer{};
+  socklen_t size = sizeof own;
+  if (ioctl(connection, SIOCOUTQ, &unacknowledged) != 0 ||
+      getsockname(connection, reinterpret_cast<sockaddr*>(&own), &size) != 0 ||
+      getpeername(connection, reinterpret_cast<sockaddr*>(&peer), &size) != 0)
+    return false;
+  std::ifstream table("/proc/net/tcp");
+  std::string line;
+  while (std::getline(table, line)) {
+    unsigned local = 0, remote = 0, sent = 0, unread = 0;
+    if (std::sscanf(line.c_str(), " %*d: %*8x:%4x %*8x:%4x %*2x %8x:%8x", &local, &remote, &sent, &unread) != 4)
+      continue;
+    if (local == ntohs(peer.sin_port) && remote == ntohs(own.sin_port)) return unread > 0 || unacknowledged > 0;
+  }
+  return false;
 }
 
 /// Answers one request per connection with given bytes, in pieces.
@@ -42,7 +71,7 @@ class FakeTcp {
       request = bytes;
       for (const test::Bytes& piece : pieces_) {
         send(client, piece.data(), piece.size(), MSG_NOSIGNAL);
-        usleep(2000);  // parts the pieces on their way: when the reader has taken one cannot be seen from here
+        while (is_unread(client)) std::this_thread::yield();  // so that pieces do not join on their way
       }
     }
   }
