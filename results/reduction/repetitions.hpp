@@ -52,16 +52,16 @@ class ZeroMovement {
   std::map<std::tuple<std::string, double, int>, Range> of_run_;
 };
 
-/// The zero that all steps of a run share, as far as it gets into its k.
+/// What the zero that all steps of a run share does to the k of that run.
 class SharedZero {
  public:
   /// `weight` of the step in the mean of the zero: ω² where T = k ω² is fitted.
   void add(const StepMean& step, double weight) { add(step.zero_u_n, step.window_begin_s, step.window_end_s, weight); }
   void add(double zero_u_n, double begin_s, double end_s, double weight);
-  /// Standard uncertainty, N: of the measured zeros, and of a zero that wanders between them by `movement_n`, where it
-  /// is taken as a line in time. A random walk tied at both ends, and a jump at any time, have the covariance min(s, t)
-  /// − s t between the shares s and t of that time; steps that are run late and weigh most feel little of it. Without
-  /// times, and with all weights equal, 1/√12 of the movement, as of a rectangle (JCGM 100, 4.3.7).
+  /// Standard uncertainty, N: of the measured zeros, and of a zero that wanders between them by `movement_n`, where it is
+  /// taken as a line in time. A random walk tied at both ends, and a jump at any time, have the covariance
+  /// min(s, t) − s t between the shares s and t of that time: steps beside one of the zeros feel little of it. 0.28 of the
+  /// movement in a run of rising speeds; without times 1/√12, as of a rectangle (JCGM 100, 4.3.7).
   [[nodiscard]] double u_n(double movement_n) const;
 
  private:
