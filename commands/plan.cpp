@@ -66,7 +66,7 @@ ExitCode run_plan(const PlanRequest& request) {
   if (request.out.empty()) return ExitCode::ok;
   if (found.choices.size() < request.choose)
     throw ConfigurationError(
-        fmt::format("--out: there is no choice {}; {} were found", request.choose, found.choices.size()));
+        fmt::format("--choose {}: only {} campaigns were found", request.choose, found.choices.size()));
   const profiles::Campaign& chosen = found.choices[request.choose - 1].campaign;
   write_output(request.out, profiles::changed_text(question.campaign, chosen));
   fmt::print(stderr, "campaign      {}\n", request.out);

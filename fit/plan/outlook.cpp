@@ -49,7 +49,7 @@ profiles::Campaign as_held(std::span<const results::StepMean> steps, profiles::C
   return campaign;
 }
 
-/// The campaign as far as it was run: repetitions that the widest occlusion has.
+/// What was run of the campaign so far: these occlusions, as often as the one that was run most.
 profiles::Campaign as_run(const Identification& identification, const profiles::Campaign& written) {
   profiles::Campaign campaign = as_held(identification.selection.used, written);
   campaign.occlusions_deg.clear();

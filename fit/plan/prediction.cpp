@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <regex>
 
 #include "base/csv.hpp"
@@ -204,7 +203,7 @@ Budget Prediction::of(const Wanted& wanted) const {
                            .u = noise_.bend * noise_.K_T,
                            .unit = kUnitOfK,
                            .sensitivity = misfit,
-                           .note = "as far as the pilot's k(phi) is from it"});
+                           .note = "by how much the pilot's k(phi) misses it"});
   return budget;
 }
 

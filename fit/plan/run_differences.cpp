@@ -1,4 +1,4 @@
-#include "fit/model/run_differences.hpp"
+#include "fit/plan/run_differences.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -10,8 +10,8 @@
 
 #include "base/csv.hpp"
 #include "base/error.hpp"
-#include "fit/model/run_differences.hpp"
 #include "fit/plan/memory.hpp"
+#include "fit/plan/run_differences.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -123,7 +123,7 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// `moved_n`: how far the zero wanders in a run, as far as it is known.
+/// `moved_n`: how far the zero wanders in a run; 0 while that is not known yet.
 void take_steps(const Fitted& fitted, double moved_n, StandNoise& noise) {
   const Identification& one = fitted.identification;
   const std::vector<StepMean>& steps = one.selection.used;

@@ -117,8 +117,8 @@ std::string figure_section(const Figures& figures, std::size_t begin, std::size_
   return drawn.empty() ? "" : html_heading(heading) + "<div class=\"figures\">\n" + drawn + "</div>\n";
 }
 
-/// The first figure belongs to the headline, the others follow the table. Of a page of several propellers each chapter
-/// is two pages in print; what a propeller alone shows besides is in its appendix.
+/// The first figure belongs to the headline, the others follow the table. On a page of several propellers each chapter
+/// prints on two pages: standard air, the budget and the last figures move into its appendix.
 std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool alone) {
   const auto& [identification, analysis] = fitted;
   const auto& [provenance, figures] = chapter;
