@@ -300,7 +300,7 @@ void check_together(std::vector<CheckedFile>& files) {
     for (const CheckedFile& other : files) {
       if (file.campaign && other.bench) attempt(file, [&] { require_within(*file.campaign, *other.bench); });
       if (file.answers && other.campaign)
-        attempt(file, [&] { require_mountings(*file.answers, plan_of(*other.campaign).mounting_angles()); });
+        attempt(file, [&] { require_mountings(*file.answers, plan_of(*other.campaign)); });
     }
   }
 }

@@ -38,7 +38,13 @@ Answers parse_answers(const std::string& text, const std::string& path) {
 
 Answers load_answers(const std::string& path) { return parse_answers(read_text(path), path); }
 
-void require_mountings(const Answers& answers, std::span<const double> expected_deg) {
+void require_mountings(const Answers& answers, const Plan& plan) {
+  if (plan.mounts_more)
+    throw ConfigurationError(
+        answers.place(answers.end_of_mountings) +
+        ": repetitions is a range and each is remounted, so how many mountings there are shows while it runs; give one "
+        "number, or run it with a person instead of --answers");
+  const std::vector<double> expected_deg = plan.mounting_angles();
   for (std::size_t i = 0; i < expected_deg.size(); ++i) {
     if (i == answers.mountings.size()) {
       throw ConfigurationError(

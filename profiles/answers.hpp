@@ -1,10 +1,10 @@
 // The answers file: the operator's answers during a campaign, written before it, for a run without a terminal.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 
+#include "profiles/plan.hpp"
 #include "profiles/strict_yaml.hpp"
 
 namespace kphi::profiles {
@@ -31,7 +31,8 @@ struct Answers {
 [[nodiscard]] Answers load_answers(const std::string& path);
 [[nodiscard]] Answers parse_answers(const std::string& text, const std::string& path);
 
-/// Throws ConfigurationError, one line, unless the mountings are exactly these, in this order.
-void require_mountings(const Answers& answers, std::span<const double> expected_deg);
+/// Throws ConfigurationError, one line, unless the mountings are exactly those of the plan, in this order, and none is
+/// decided while it runs.
+void require_mountings(const Answers& answers, const Plan& plan);
 
 }  // namespace kphi::profiles

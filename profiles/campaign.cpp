@@ -57,6 +57,23 @@ void read_until(ProfileReader& file, StepProfile& profile) {
     file.require_above("/profile/dwell_s/1", "/profile/dwell_s/0", " s", "write the shorter time first");
 }
 
+/// The number alone, or a range, which belongs to `until`.
+void read_repetitions(ProfileReader& file, Campaign& campaign) {
+  campaign.repetitions_extra_max = file.get_or<int>("/repetitions_extra_max", campaign.repetitions_extra_max);
+  if (!file.has("/repetitions/0")) {
+    campaign.repetitions = file.get_or<int>("/repetitions", campaign.repetitions);
+    return;
+  }
+  if (!campaign.profile.until)
+    file.refuse("/repetitions", "a range without profile.until", "add until: {k_percent: 0.2}, or give one number");
+  if (file.has("/repetitions_extra_max"))
+    file.refuse("/repetitions_extra_max", "repetitions is a range, which says how many at most", "remove one of them");
+  file.require_above("/repetitions/1", "/repetitions/0", "", "write the smaller number first");
+  campaign.repetitions = file.get<int>("/repetitions/0");
+  campaign.repetitions_most = file.get<int>("/repetitions/1");
+  campaign.repetitions_extra_max = *campaign.repetitions_most - campaign.repetitions;
+}
+
 Order read_order(ProfileReader& file) {
   Order order;
   order.runs = file.get_or("/order/runs", order.runs);
@@ -91,12 +108,11 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
   campaign.propeller = {file.text("/propeller/id"), file.text("/propeller/name"), file.number("/propeller/diameter_in"),
                         file.get<int>("/propeller/blades")};
   campaign.occlusions_deg = file.get<std::vector<double>>("/occlusions_deg");
-  campaign.repetitions = file.get_or<int>("/repetitions", campaign.repetitions);
-  campaign.repetitions_extra_max = file.get_or<int>("/repetitions_extra_max", campaign.repetitions_extra_max);
   campaign.order = read_order(file);
   campaign.profile = {file.get<int>("/profile/steps"), Seconds(file.number(longest_dwell(file))),
                       from_rpm(file.number("/profile/first_rpm")), from_rpm(file.number("/profile/last_rpm"))};
   read_until(file, campaign.profile);
+  read_repetitions(file, campaign);
   if (const auto rpm_s = file.find<double>("/profile/slew_rpm_s"))
     campaign.profile.slew_rad_s2 = from_rpm(*rpm_s).value();
   campaign.zero = Seconds(file.number("/zero_s"));

@@ -35,9 +35,10 @@ struct Propeller {
   int blades = 0;
 };
 
-/// A step ends before its time once it has settled and its mean is certain enough.
+/// A step ends before its time once it has settled and its mean is certain enough, a run leaves out steps that its k
+/// does not need (RunCertainty), and an occlusion is run again while that would move its k.
 struct Until {
-  double k_share = 0;   ///< half of the 95 % interval of the k of a run, as a share of it
+  double k_share = 0;   ///< half of the 95 % interval of the k of a run, and of how far another run would move it
   Seconds dwell_least;  ///< no step ends before
 };
 
@@ -63,9 +64,10 @@ struct Campaign {
   std::string name;
   std::string operator_name;  ///< may be empty
   Propeller propeller;
-  std::vector<double> occlusions_deg;  ///< degrees in [0, 360), each once, as listed
-  int repetitions = 3;
-  int repetitions_extra_max = 1;  ///< more runs of an occlusion whose repetitions disagree
+  std::vector<double> occlusions_deg;        ///< degrees in [0, 360), each once, as listed
+  int repetitions = 3;                       ///< at least
+  std::optional<int> repetitions_most = {};  ///< with profile.until; nullopt: as many as at least
+  int repetitions_extra_max = 1;  ///< more runs of an occlusion whose repetitions disagree; of a range what it leaves
   Order order;
   StepProfile profile;
   Seconds zero;             ///< motor off, before and after each run

@@ -82,7 +82,10 @@ std::string changed_text(const Campaign& campaign, const Campaign& wanted) {
   Editor editor(campaign.text, campaign.path);
   if (wanted.occlusions_deg != campaign.occlusions_deg)
     editor.set("", "occlusions_deg", fmt::format("[{:g}]", fmt::join(wanted.occlusions_deg, ", ")));
-  if (wanted.repetitions != campaign.repetitions) editor.set("", "repetitions", std::to_string(wanted.repetitions));
+  if (wanted.repetitions != campaign.repetitions || wanted.repetitions_most != campaign.repetitions_most)
+    editor.set("", "repetitions",
+               wanted.repetitions_most ? fmt::format("[{}, {}]", wanted.repetitions, *wanted.repetitions_most)
+                                       : std::to_string(wanted.repetitions));
   if (wanted.order.remount_each_repetition != campaign.order.remount_each_repetition)
     editor.set("/order", "remount_each_repetition", wanted.order.remount_each_repetition ? "true" : "false");
   if (wanted.profile.steps != campaign.profile.steps)
@@ -93,6 +96,7 @@ std::string changed_text(const Campaign& campaign, const Campaign& wanted) {
   if (wanted.name != campaign.name) editor.set("", "name", wanted.name);
   const Campaign read = parse_campaign(editor.text(), campaign.path);
   if (read.occlusions_deg != wanted.occlusions_deg || read.repetitions != wanted.repetitions ||
+      read.repetitions_most != wanted.repetitions_most ||
       read.order.remount_each_repetition != wanted.order.remount_each_repetition ||
       read.profile.until.has_value() != wanted.profile.until.has_value() ||
       read.profile.steps != wanted.profile.steps || read.profile.dwell.value() != wanted.profile.dwell.value() ||

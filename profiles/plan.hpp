@@ -30,9 +30,11 @@ struct PlannedRun {
   [[nodiscard]] bool is_reference() const { return repetition < 0; }
 };
 
+/// Where repetitions is a range: the least that there can be.
 struct Plan {
   std::vector<PlannedRun> runs;  ///< in the order in which they are run
   int mountings = 0;             ///< how often a person mounts an occlusion, the first one included
+  bool mounts_more = false;      ///< more mountings may follow: repetitions is a range, and each is remounted
   int steps = 0;                 ///< in all runs
   Seconds spinning;              ///< motor on: steps, and ramps between them
   Seconds bench;                 ///< spinning, zeros and biases; without mounting, cooling, spinning down

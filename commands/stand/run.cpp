@@ -184,7 +184,7 @@ ExitCode run(const RunOptions& options) {
   if (destination.finished) return print_finished(destination, options.json);
   if (!destination.resumption) require_possible(dry);
   // A resumption asks only for the missing runs: the operator reports missing answers.
-  if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan.mounting_angles());
+  if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan);
   const SignalWatch signals;  // before the words that promise it
   announce(request, dry);
   live::LiveSession view(options.live, live::subject_of(campaign, config));

@@ -8,7 +8,7 @@
 
 #include "base/json.hpp"
 #include "results/digest.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/next_run.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::daq {
@@ -123,9 +123,31 @@ std::optional<AnotherRun> CampaignReview::another(double occlusion_deg) {
     progress_.say(to_words(verdict));
     note_("repetitions_judged", to_json(verdict));
   }
+  if (campaign_.repetitions_most) return while_it_moves_k(verdicts, occlusion_deg, made);
   if (!verdict.asks_for_another) return std::nullopt;
   return AnotherRun{occlusion_deg, verdict.reason, made - campaign_.repetitions + 1, campaign_.repetitions_extra_max,
                     campaign_.order.remount_each_repetition};
+}
+
+std::optional<AnotherRun> CampaignReview::while_it_moves_k(std::span<const results::RepetitionVerdict> verdicts,
+                                                           double occlusion_deg, int made) const {
+  const double most = campaign_.profile.until->k_share, moved = moved_by_next_run(verdicts, occlusion_deg);
+  const std::string words = std::isfinite(moved)
+                                ? fmt::format("another run would move k by up to {:.2f} %", 100 * moved)
+                                : "k is not known yet";
+  const bool enough = moved <= most, last = made >= *campaign_.repetitions_most;
+  progress_.say(
+      fmt::format("{:g}°: {}, {:g} % is enough{}", occlusion_deg, words, 100 * most,
+                  enough ? ""
+                  : last ? fmt::format("; not run again: {} runs are the most", made)
+                         : fmt::format(": running it again, {} of at most {}", made + 1, *campaign_.repetitions_most)));
+  if (enough || last) return std::nullopt;
+  return AnotherRun{occlusion_deg,
+                    words,
+                    made - campaign_.repetitions + 1,
+                    campaign_.repetitions_extra_max,
+                    campaign_.order.remount_each_repetition,
+                    true};
 }
 
 void CampaignReview::conclude() {

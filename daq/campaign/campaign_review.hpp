@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "daq/run/progress.hpp"
 #include "daq/run/speed_cap.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/reduction/repetitions.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::daq {
@@ -31,7 +33,7 @@ class CampaignReview {
   /// SHA-256 goes into the journal.
   void write(const results::CampaignFolder& folder, results::FileLayer& files);
   /// Once all planned repetitions of the occlusion are there: the question to ask if they disagree and the campaign
-  /// allows another run.
+  /// allows another run. Where repetitions is a range, a decision: another run while it would move k too far.
   [[nodiscard]] std::optional<AnotherRun> another(double occlusion_deg);
   /// Repetitions of the occlusion so far, reference runs not counted.
   [[nodiscard]] int repetitions(double occlusion_deg) const;
@@ -43,6 +45,9 @@ class CampaignReview {
 
  private:
   void sort();
+  /// Of an occlusion run `made` times, where repetitions is a range.
+  [[nodiscard]] std::optional<AnotherRun> while_it_moves_k(std::span<const results::RepetitionVerdict> verdicts,
+                                                           double occlusion_deg, int made) const;
   const profiles::Campaign& campaign_;
   Progress& progress_;
   Note note_;

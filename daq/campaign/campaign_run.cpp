@@ -210,15 +210,15 @@ class CampaignRun {
     }
   }
 
-  /// Once all repetitions are there: adds runs while they disagree and the operator agrees.
+  /// Once all repetitions are there: adds runs while they disagree and the operator agrees, or the campaign says so.
   void add_repetitions(double occlusion_deg) {
     if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
     while (const auto question = review_.another(occlusion_deg)) {
-      const bool yes = ask_for_another(*question);
+      const bool yes = question->decided || ask_for_another(*question);
       note("another_run", {{"occlusion_deg", occlusion_deg},
                            {"reason", question->reason},
                            {"decided", yes},
-                           {"decided_by", person_.name()}});
+                           {"decided_by", question->decided ? "campaign file" : person_.name()}});
       if (!yes) return;
       ++planned_;
       execute_run(profiles::extra_run(campaign_, occlusion_deg, review_.repetitions(occlusion_deg) + 1));
@@ -329,8 +329,10 @@ class CampaignRun {
     const auto driven =
         std::ranges::count_if(recording.phases, [](const auto& mark) { return mark.phase == results::Phase::step; });
     // Skipped at full drive, learned in earlier runs or in this one.
-    if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven; left_out > 0)
+    if (const auto left_out = static_cast<std::ptrdiff_t>(planned.steps.size()) - driven - run.steps_not_needed;
+        left_out > 0)
       accepted["steps_left_out"] = left_out;
+    if (run.steps_not_needed > 0) accepted["steps_not_needed"] = run.steps_not_needed;
     if (run.stop) accepted["stop"] = to_json(*run.stop);
     for (const StreamEvent& event : recording.events) accepted["events"].push_back(event.text);
     accepted_at_ = bench_.clock().now();
@@ -340,8 +342,9 @@ class CampaignRun {
     const int flagged = count(run.file, recording, means);
     review_.write(folder_, bench_.files());
     for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}", result_.runs, planned_,
-                              run.file.filename().string(), run.account.received, lost, flagged, means.size(),
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}{}", result_.runs,
+                              planned_, run.file.filename().string(), run.account.received, lost, flagged, means.size(),
+                              run.steps_not_needed > 0 ? fmt::format(", {} not needed", run.steps_not_needed) : "",
                               rest_words(run.stop)));
     if (!so_far_ || planned.is_reference()) return;
     if (const std::string words = so_far_(review_.steps()); !words.empty()) progress_.reached(words);

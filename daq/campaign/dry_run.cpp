@@ -169,7 +169,7 @@ class Checks {
 
   void answers(const profiles::Answers& answers, const profiles::Plan& plan) {
     try {
-      profiles::require_mountings(answers, plan.mounting_angles());
+      profiles::require_mountings(answers, plan);
       add(Severity::note, "answers", fmt::format("{}: one answer per mounting", answers.path));
     } catch (const ConfigurationError& refused) {
       add(Severity::fault, "answers", refused.what());
@@ -304,10 +304,11 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
   std::string angles;
   for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
   return fmt::format(
-      "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
+      "{}: propeller {} ({}), occlusions{}, {}{} repetitions\n"
       "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {} each; {} mountings\n"
       "  {}{} spinning, {} on the bench{}, {:.1f} million samples, {}",
-      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions, plan.runs.size(),
+      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions,
+      campaign.repetitions_most ? fmt::format(" to {}", *campaign.repetitions_most) : "", plan.runs.size(),
       plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last),
       profile.until ? fmt::format("{:g} to {:g} s", profile.until->dwell_least.value(), profile.dwell.value())
                     : fmt::format("{:g} s", profile.dwell.value()),
@@ -320,13 +321,16 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
   return fmt::format(
       "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
-      "spinning down{}, and at most {} more per occlusion if repetitions disagree\n\nchecks: {}\n{}\n"
+      "spinning down{}, and at most {} more per occlusion {}\n\nchecks: {}\n{}\n"
       "the motor coasts when the guard sees:\n  {}\n",
       plan_text(campaign, config, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
       minutes(dry.plan.spinning.value()),
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
       minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
       campaign.repetitions_extra_max == 1 ? "1 run" : fmt::format("{} runs", campaign.repetitions_extra_max),
+      campaign.repetitions_most
+          ? fmt::format("while one more would move its k by over {:g} %", 100 * campaign.profile.until->k_share)
+          : "if repetitions disagree",
       fmt::format("{} refused, {} not checked", dry.refused(),
                   std::ranges::count(dry.checks, false, &PlanCheck::judged)),
       checks_text(dry.checks), fmt::join(to_lines(dry.limits), "\n  "));

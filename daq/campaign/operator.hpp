@@ -19,13 +19,14 @@ class NotMounted : public Interrupted {
   using Interrupted::Interrupted;
 };
 
-/// The repetitions of an occlusion disagree.
+/// An occlusion needs another run: its repetitions disagree, or its k is not certain enough.
 struct AnotherRun {
   double occlusion_deg = 0;
   std::string reason;         ///< one line
   int extra = 1;              ///< number of this run among those beyond the plan, from 1
   int extra_max = 1;          ///< the campaign allows this many
   bool mounted_anew = false;  ///< the occlusion must be mounted again before it
+  bool decided = false;       ///< by the campaign file: nobody is asked
 };
 
 /// The person at the bench. All members are called from the runner's thread, while the motor coasts.

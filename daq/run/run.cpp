@@ -202,7 +202,9 @@ RunResult record_run(Bench& bench, const RunOrder& order, Progress& progress, co
   results::RunEnding ending{
       results::Outcome::complete, "", account, bench.load_cell().health(), bench.motor().counts() - counts_before,
       sequence.box_bias()};
-  if (!ended.cause) return {order.file, writer.finish(ending, results::views_of), account, sequence.stop()};
+  if (!ended.cause)
+    return {order.file, writer.finish(ending, results::views_of), account, sequence.stop(),
+            sequence.steps_not_needed()};
 
   ending.outcome = results::Outcome::aborted;
   ending.outcome_reason = ended.words.line();

@@ -19,6 +19,7 @@ struct RunResult {
   results::RunDigests digests;
   SampleAccount account;
   std::optional<iq::StopReport> stop;  ///< how the motor came to rest
+  int steps_not_needed = 0;            ///< left out because k was certain enough without them
 };
 
 /// `stop_asked` is checked on every tick. Throws Interrupted, SafetyStop or RecordError after the motor coasts and the

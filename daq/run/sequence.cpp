@@ -179,11 +179,25 @@ void Sequence::ramp_to(RadPerSec level, MotorEnable& spin) {
 }
 
 void Sequence::go_through_the_steps(MotorEnable& spin) {
-  for (const profiles::PlannedStep& step : order_.planned.steps) {
-    if (out_of_reach_ && step.speed >= *out_of_reach_) continue;
-    hold_step(step, spin);
-    learn_from(step);
+  const auto& until = order_.campaign.profile.until;
+  std::optional<profiles::RunCertainty> certainty;
+  if (until) certainty.emplace(*until, order_.planned.steps);
+  for (auto step = order_.planned.steps.begin(); step != order_.planned.steps.end(); ++step) {
+    const bool reached = !out_of_reach_ || step->speed < *out_of_reach_;
+    if (reached && (!certainty || certainty->needs(*step))) {
+      hold_step(*step, certainty, spin);
+      learn_from(*step, std::span(step + 1, order_.planned.steps.end()));
+      continue;
+    }
+    if (certainty) certainty->left_out(*step);
+    if (reached) leave_out(1);
+    steps_not_needed_ += reached;
   }
+}
+
+void Sequence::leave_out(std::ptrdiff_t steps) {
+  position_.steps -= static_cast<int>(steps);
+  end_ -= steps * from_seconds(order_.campaign.profile.dwell.value());
 }
 
 void Sequence::follow(Steering& steering, MotorEnable& spin) {
@@ -232,43 +246,44 @@ void Sequence::spin() {
   if (!stop_->safe()) throw SafetyStop("motor: " + stop_->summary());
 }
 
-void Sequence::hold_step(const profiles::PlannedStep& step, MotorEnable& spin) {
+void Sequence::hold_step(const profiles::PlannedStep& step, std::optional<profiles::RunCertainty>& certainty,
+                         MotorEnable& spin) {
   ramp_to(step.speed, spin);
   ++position_.step;
   position_.commanded = step.speed;
   change_speed();
   spin.at(step.speed);
   mark(Phase::step, step.number, step.speed);
-  const auto& profile = order_.campaign.profile;
-  if (profile.until)
-    hold_until(*profile.until, step, spin);
+  if (certainty)
+    hold_until_certain(step, *certainty, spin);
   else
-    hold(from_seconds(profile.dwell.value()), &spin);
+    hold(from_seconds(order_.campaign.profile.dwell.value()), &spin);
   progress_.step_done(position_, seen_);
 }
 
-void Sequence::hold_until(const profiles::Until& until, const profiles::PlannedStep& step, MotorEnable& spin) {
-  const double most_s = order_.campaign.profile.dwell.value();
+void Sequence::hold_until_certain(const profiles::PlannedStep& step, profiles::RunCertainty& certainty,
+                                  MotorEnable& spin) {
+  const auto& profile = order_.campaign.profile;
+  const double most_s = profile.dwell.value();
   const auto axis = static_cast<std::size_t>(order_.config.thrust_axis);
   StepWatch watch(order_.campaign.minimum_discard.value(), most_s);
-  double squares = 0;
-  for (const profiles::PlannedStep& each : order_.planned.steps) squares += std::pow(each.speed.value(), 4);
-  const double x = step.speed.value() * step.speed.value();
   const Instant begin = bench_.clock().now();
+  const auto since = [&] { return to_seconds(bench_.clock().now() - begin); };
   const Duration tick_length = bench_.clock().stretched(kTickWall);
-  for (double since = 0; since < most_s; since = to_seconds(bench_.clock().now() - begin)) {
-    hold(std::min(tick_length, from_seconds(most_s - since)), &spin);
+  while (since() < most_s) {
+    hold(std::min(tick_length, from_seconds(most_s - since())), &spin);
     const netbox::ZeroMeasurement measured = recorder_.measured();
-    watch.add(to_seconds(bench_.clock().now() - begin), measured.records, measured.mean[axis]);
-    if (to_seconds(bench_.clock().now() - begin) < until.dwell_least.value()) continue;
+    watch.add(since(), measured.records, measured.mean[axis]);
+    if (since() < profile.until->dwell_least.value()) continue;
     const auto [mean_n, u_n] = watch.known();
-    const double enough = good_enough_n(until.k_share, mean_n - zero_n_, x, squares, order_.planned.steps.size());
-    if (u_n <= enough) break;  // false while one of them is unknown
+    if (u_n <= certainty.enough_n(step, mean_n - zero_n_)) break;  // false while one of them is unknown
   }
-  end_ -= from_seconds(std::max(0.0, most_s - to_seconds(bench_.clock().now() - begin)));
+  const auto [mean_n, u_n] = watch.known();
+  certainty.held(step, mean_n - zero_n_, u_n, since());
+  end_ -= from_seconds(std::max(0.0, most_s - since()));
 }
 
-void Sequence::learn_from(const profiles::PlannedStep& step) {
+void Sequence::learn_from(const profiles::PlannedStep& step, std::span<const profiles::PlannedStep> later) {
   if (!seen_.motor_is_fresh() || !is_out_of_drive(step.speed, seen_.speed(), seen_.drive_pwm)) return;
   const double volts = seen_.judged[Watched::supply_voltage_low], wanted = order_.campaign.supply.value();
   if (volts < (1 - results::kSupplyBand) * wanted)
@@ -277,14 +292,11 @@ void Sequence::learn_from(const profiles::PlannedStep& step) {
                     "RPM; check its leads and its current limit",
                     volts, wanted, to_rpm(seen_.speed()), to_rpm(step.speed)));
   out_of_reach_ = step.speed;
-  const auto& steps = order_.planned.steps;
-  const auto left_out = std::count_if(steps.begin() + position_.step + 1, steps.end(),
-                                      [&](const auto& later) { return later.speed >= *out_of_reach_; });
-  if (left_out == 0) return;
-  position_.steps -= static_cast<int>(left_out);
-  end_ -= left_out * from_seconds(order_.campaign.profile.dwell.value());
+  const auto out = std::ranges::count_if(later, [&](const auto& one) { return one.speed >= *out_of_reach_; });
+  if (out == 0) return;
+  leave_out(out);
   progress_.say(fmt::format("motor: full drive gives {:.0f} of {:.0f} RPM; skipping {} steps at or above",
-                            to_rpm(seen_.speed()), to_rpm(step.speed), left_out));
+                            to_rpm(seen_.speed()), to_rpm(step.speed), out));
 }
 
 void Sequence::mark(Phase phase, int step, RadPerSec commanded) {

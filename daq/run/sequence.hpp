@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "base/clock.hpp"
@@ -14,6 +15,7 @@
 #include "daq/run/recorder.hpp"
 #include "daq/run/run_order.hpp"
 #include "drivers/iq/session/stopping.hpp"
+#include "profiles/run_certainty.hpp"
 
 namespace kphi::daq {
 
@@ -42,6 +44,8 @@ class Sequence {
   void run();
   [[nodiscard]] const results::BoxBias& box_bias() const { return box_bias_; }
   [[nodiscard]] const std::optional<iq::StopReport>& stop() const { return stop_; }
+  /// Steps left out because k was certain enough without them.
+  [[nodiscard]] int steps_not_needed() const { return steps_not_needed_; }
   /// The supply switched itself off, but another cause was seen first.
   [[nodiscard]] const std::optional<StreamEvent>& supply_event() const { return supply_event_; }
   /// After the motor was coasted: adds to `words` the state of motor and supply, and what else the module reported.
@@ -62,11 +66,13 @@ class Sequence {
   void go_through_the_steps(MotorEnable& spin);
   /// As the steering wants, no faster than the campaign's slew.
   void follow(Steering& steering, MotorEnable& spin);
-  void hold_step(const profiles::PlannedStep& step, MotorEnable& spin);
-  /// To its end, or until it is certain enough.
-  void hold_until(const profiles::Until& until, const profiles::PlannedStep& step, MotorEnable& spin);
-  /// If the motor missed a speed at full drive, the run skips the remaining steps at or above it.
-  void learn_from(const profiles::PlannedStep& step);
+  void leave_out(std::ptrdiff_t steps);
+  /// With `certainty` until it is certain enough, at most as long as the campaign says; else to its end.
+  void hold_step(const profiles::PlannedStep& step, std::optional<profiles::RunCertainty>& certainty,
+                 MotorEnable& spin);
+  void hold_until_certain(const profiles::PlannedStep& step, profiles::RunCertainty& certainty, MotorEnable& spin);
+  /// If the motor missed a speed at full drive, the run skips the `later` steps at or above it.
+  void learn_from(const profiles::PlannedStep& step, std::span<const profiles::PlannedStep> later);
   void mark(results::Phase phase, int step = -1, RadPerSec commanded = RadPerSec(0));
   /// Takes no time if the campaign sets no ramp.
   void ramp_to(RadPerSec level, MotorEnable& spin);
@@ -92,6 +98,7 @@ class Sequence {
   int events_shown_ = 0;
   std::string stalled_;  ///< the event that says that the box's measurement stalled; empty while it measures
   results::BoxBias box_bias_;
+  int steps_not_needed_ = 0;
   bool has_spun_ = false;
   bool power_is_off_ = false;              ///< confirmed by the supply
   std::optional<RadPerSec> out_of_reach_;  ///< the lowest speed missed at full drive

@@ -59,10 +59,4 @@ StepWatch::Known StepWatch::known() const {
   return {mean, level.u};
 }
 
-double good_enough_n(double k_share, double thrust_n, double x, double squares, std::size_t steps) {
-  constexpr double kOfNoise = 0.5, kTwoSided = 2;
-  return kOfNoise * k_share / kTwoSided * std::abs(thrust_n) * squares /
-         (x * x * std::sqrt(static_cast<double>(steps)));
-}
-
 }  // namespace kphi::daq

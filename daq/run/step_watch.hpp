@@ -1,7 +1,6 @@
 // Watches the thrust of a step while it is held: whether it has settled, and how certain its mean is already.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -31,10 +30,5 @@ class StepWatch {
   double sum_ = 0;      ///< of all records up to there, N
   std::uint64_t records_ = 0;
 };
-
-/// Standard uncertainty of the mean thrust of a step, N, that is good enough for k of its run to be known to `k_share`
-/// (half of a 95 % interval), if noise may take half of it and every step an equal part. `thrust_n` at `x` = ω²;
-/// `squares`: Σ x² over the `steps` of the run.
-[[nodiscard]] double good_enough_n(double k_share, double thrust_n, double x, double squares, std::size_t steps);
 
 }  // namespace kphi::daq

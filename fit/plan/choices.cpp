@@ -96,6 +96,7 @@ std::vector<Candidate> candidates(const PlanQuestion& question) {
       Campaign campaign = question.campaign;
       campaign.occlusions_deg = occlusions_deg;
       campaign.order.remount_each_repetition = remounts;
+      campaign.repetitions_most.reset();
       for (int repetitions = kLeastRepetitions; repetitions <= kMostRepetitions; ++repetitions) {
         campaign.repetitions = repetitions;
         const int runs = repetitions * static_cast<int>(occlusions_deg.size()) + (campaign.order.reference ? 2 : 0);
@@ -106,10 +107,10 @@ std::vector<Candidate> candidates(const PlanQuestion& question) {
               campaign.profile.steps = steps;
               campaign.profile.dwell = Seconds(dwell);
               campaign.zero = Seconds(zero);
-              const double held_s = as_expected(campaign, question.noise).profile.dwell.value();
-              const double run_s =
-                  steps * held_s * (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
-                  (campaign.box_bias ? 4 : 2) * zero;
+              const profiles::StepProfile held = as_expected(campaign, question.noise).profile;
+              const double run_s = held.steps * held.dwell.value() *
+                                       (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
+                                   (campaign.box_bias ? 4 : 2) * zero;
               all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
             }
       }
@@ -153,10 +154,12 @@ std::size_t widest_occlusions(const PlanAnswer& answer) {
 
 std::string choice_line(const std::string& name, const Choice& choice, std::size_t occlusions_width) {
   const Campaign& one = choice.campaign;
-  std::string line = fmt::format(
-      "{:<7} {:>6.1f} {:>6} {:>4} {:>5.2f}  {} x {:<{}} {:>3} x {:<6} {:>5}", name, choice.minutes(), choice.mountings,
-      choice.runs, 1e-9 * static_cast<double>(choice.bytes), one.repetitions, occlusion_words(one), occlusions_width,
-      one.profile.steps, fmt::format("{:g} s", one.profile.dwell.value()), fmt::format("{:g} s", one.zero.value()));
+  const char* most = one.profile.until ? "≤" : "";
+  std::string line =
+      fmt::format("{:<7} {:>6.1f} {:>6} {:>4} {:>5.2f}  {} x {:<{}} {:>3} x {:<6} {:>5}", name, choice.minutes(),
+                  choice.mountings, choice.runs, 1e-9 * static_cast<double>(choice.bytes), one.repetitions,
+                  occlusion_words(one), occlusions_width, fmt::format("{}{}", most, one.profile.steps),
+                  fmt::format("{}{:g} s", most, one.profile.dwell.value()), fmt::format("{:g} s", one.zero.value()));
   for (const Budget& budget : choice.told) line += fmt::format(" {:>9}", percent(share_of(budget)));
   return line + fmt::format(" {:>7}\n", percent(choice.bend_seen));
 }

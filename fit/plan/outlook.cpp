@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "fit/model/step_selection.hpp"
 #include "profiles/plan.hpp"
 
 namespace kphi::fit {
@@ -38,13 +39,23 @@ std::optional<Reached> reached(const Wanted& wanted, const Fitted& fitted, const
   return result;
 }
 
-/// With steps that ended by themselves as long as they were.
+/// With steps that ended by themselves as many and as long as they were.
 profiles::Campaign as_held(std::span<const results::StepMean> steps, profiles::Campaign campaign) {
   if (!campaign.profile.until) return campaign;
-  double held_s = 0;
-  for (const results::StepMean& step : steps)
+  const RadPerSec least = from_rpm(kSpeedMinRpm);  // the fit takes none below
+  double held_s = 0, held = 0, planned = 0;
+  std::set<std::pair<double, int>> runs;
+  for (const results::StepMean& step : steps) {
+    runs.emplace(step.occlusion_deg, step.repetition);
     held_s += (step.window_end_s - step.window_begin_s + step.discarded_s) / static_cast<double>(steps.size());
+    held += step.commanded_speed_rad_s >= least.value();
+  }
+  for (const profiles::PlannedStep& step : profiles::extra_run(campaign, 0, 1).steps) planned += step.speed >= least;
   if (held_s > 0) campaign.profile.dwell = Seconds(held_s);  // false where a step does not know it
+  if (held > 0 && planned > 0) {
+    const double share = std::min(1.0, held / (planned * static_cast<double>(runs.size())));
+    campaign.profile.steps = std::max(2, static_cast<int>(std::lround(campaign.profile.steps * share)));
+  }
   campaign.profile.until.reset();
   return campaign;
 }

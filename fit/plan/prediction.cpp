@@ -11,12 +11,14 @@
 #include "base/error.hpp"
 #include "fit/model/step_selection.hpp"
 #include "profiles/plan.hpp"
+#include "profiles/run_certainty.hpp"
 #include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/repetitions.hpp"
 
 namespace kphi::fit {
 namespace {
 
+constexpr double kTick = 0.02;  // s
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 bool is_fitted(const profiles::PlannedStep& step) { return to_rpm(step.speed) >= kSpeedMinRpm; }
@@ -123,8 +125,29 @@ std::vector<Wanted> usual_wants(const profiles::Campaign& campaign) {
 profiles::Campaign as_expected(profiles::Campaign campaign, const StandNoise& noise) {
   auto& profile = campaign.profile;
   if (!profile.until) return campaign;
-  const double settled_s = noise.settle_s + results::kLeastWindow;
-  profile.dwell = Seconds(std::clamp(settled_s, profile.until->dwell_least.value(), profile.dwell.value()));
+  const double least_s =
+      std::clamp(noise.settle_s + results::kLeastWindow, profile.until->dwell_least.value(), profile.dwell.value());
+  const std::vector<profiles::PlannedStep> steps =
+      profiles::steps_in_order(profile.levels(), profiles::StepOrderKind::up, 0);
+  profiles::RunCertainty certainty(*profile.until, steps);
+  double held_s = 0;
+  int held = 0;
+  for (const profiles::PlannedStep& step : steps) {
+    if (!certainty.needs(step)) {
+      certainty.left_out(step);
+      continue;
+    }
+    const double thrust_n = noise.k_at(0) * step.speed.value() * step.speed.value();
+    const double enough_n = certainty.enough_n(step, thrust_n);
+    double dwell_s = least_s;
+    const auto u_n = [&] { return noise.step_n(thrust_n, dwell_s - noise.settle_s); };
+    while (dwell_s < profile.dwell.value() && !(u_n() <= enough_n)) dwell_s += kTick;
+    certainty.held(step, thrust_n, u_n(), dwell_s);
+    held_s += dwell_s;
+    ++held;
+  }
+  profile.dwell = Seconds(held_s / held);
+  profile.steps = held;
   profile.until.reset();
   return campaign;
 }

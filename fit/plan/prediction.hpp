@@ -30,7 +30,8 @@ struct Wish {
 /// The numbers that are told where nobody wishes for one: K_T, slope, k at half of the widest occlusion.
 [[nodiscard]] std::vector<Wanted> usual_wants(const profiles::Campaign& campaign);
 
-/// With steps that end by themselves (until): the campaign whose steps last as long as they are expected to.
+/// With steps that end by themselves (until): as many evenly spaced steps as a run is expected to hold, for as long as
+/// their mean.
 [[nodiscard]] profiles::Campaign as_expected(profiles::Campaign campaign, const StandNoise& noise);
 
 class Prediction {

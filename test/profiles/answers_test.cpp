@@ -20,8 +20,10 @@ constexpr const char* kText =
 
 /// What require_mountings says; empty when it is content.
 std::string refused(const std::vector<double>& expected_deg, const std::string& text = kText) {
+  Plan plan;
+  for (const double angle : expected_deg) plan.runs.push_back({.occlusion_deg = angle});
   try {
-    require_mountings(parse_answers(text, "a.yaml"), expected_deg);
+    require_mountings(parse_answers(text, "a.yaml"), plan);
   } catch (const ConfigurationError& error) {
     return error.what();
   }
@@ -55,6 +57,18 @@ TEST(Answers, OfTheWrongKindAreRefusedAtTheirPlace) {
 }
 
 TEST(RequireMountings, IsContentWithJustThose) { EXPECT_EQ(refused({0, 45, 90}), ""); }
+
+TEST(RequireMountings, RefusesAnswersWhereMoreMayFollow) {
+  Plan plan;
+  plan.runs = {{.occlusion_deg = 0}};
+  plan.mounts_more = true;
+  try {
+    require_mountings(parse_answers("format: kphi-answers/1\nmountings: [0]\n", "a.yaml"), plan);
+    FAIL() << "accepted";
+  } catch (const ConfigurationError& error) {
+    EXPECT_THAT(error.what(), StartsWith("a.yaml:2:13: repetitions is a range and each is remounted"));
+  }
+}
 
 TEST(RequireMountings, NamesTheFirstThatIsWrongMissingOrLeftOver) {
   EXPECT_EQ(refused({0, 90, 45}),

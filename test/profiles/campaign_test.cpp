@@ -121,6 +121,12 @@ TEST(Campaign, EachMistakeEarnsItsRefusal) {
        {"dwell_s: 2.0", "dwell_s: [0.4, 4]\n  until: {k_percent: 0.2}",
         "13:13: profile.dwell_s[0]: 0.4 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing is left to "
         "average"},
+       // So do a range of repetitions and what ends them
+       {"repetitions: 2", "repetitions: [2, 5]",
+        "10:14: repetitions: a range without profile.until; add until: {k_percent: 0.2}, or give one number"},
+       {"repetitions: 2", "repetitions: [2, 2.5]", "10:18: repetitions[1]: expected a whole…"},
+       {"repetitions: 2", "repetitions: [1, 5]", "10:15: repetitions[0]: 1 is below 2; write a value from 2 to 20"},
+       {"repetitions: 2", "repetitions: [2, 5, 6]", "10:14: repetitions: …"},
        // Refuses dwells that leave nothing to average
        {"dwell_s: 2.0", "dwell_s: 0.5",
         "13:12: profile.dwell_s: 0.5 is not above 0.5 s (minimum_discard_s); dwell longer, or nothing "
@@ -196,6 +202,27 @@ TEST(Campaign, EachMistakeEarnsItsRefusal) {
         "13:3: zero_s is not a key of profile; it belongs to the top of the file"},
        {"  steps: 4\n", "  steps: 4\n  colour: red\n",
         "13:3: colour is not a key of profile; known here: dwell_s, first_rpm, last_rpm, slew_rpm_s, steps, until"}});
+}
+
+Campaign until(const std::string& repetitions) {
+  return parse_campaign(changed(changed(kCampaignText, "dwell_s: 2.0", "dwell_s: [0.7, 4]\n  until: {k_percent: 0.2}"),
+                                "repetitions: 2", repetitions),
+                        "c.yaml");
+}
+
+TEST(Campaign, WithUntilMayLeaveTheNumberOfRunsOpen) {
+  EXPECT_EQ(until("repetitions: 2").repetitions_most, std::nullopt);
+  const Campaign open = until("repetitions: [2, 5]");
+  EXPECT_EQ(open.repetitions, 2);
+  EXPECT_EQ(open.repetitions_most, 5);
+  EXPECT_EQ(
+      refusals([] { return until("repetitions: [5, 2]"); }),
+      std::vector<std::string>{"10:18: repetitions[1]: 2 is not above 5 (repetitions[0]); write the smaller number "
+                               "first"});
+  EXPECT_EQ(
+      refusals([] { return until("repetitions: [2, 5]\nrepetitions_extra_max: 1"); }),
+      std::vector<std::string>{"11:24: repetitions_extra_max: repetitions is a range, which says how many at most; "
+                               "remove one of them"});
 }
 
 struct Range {

@@ -34,6 +34,18 @@ void expect_as_wanted(const Campaign& campaign) {
   EXPECT_EQ(read.limits["thrust_max_n"], campaign.limits["thrust_max_n"]);
 }
 
+TEST(CampaignText, WritesANumberForARangeOfRepetitionsAndBack) {
+  Campaign fixed = shipped();
+  fixed.text.replace(fixed.text.find("dwell_s: 2.0"), 12, "dwell_s: [1.2, 4]\n  until: {k_percent: 0.2}");
+  fixed = parse_campaign(fixed.text, "x.yaml");
+  Campaign open = fixed;
+  open.repetitions = 2;
+  open.repetitions_most = 5;
+  const Campaign read = parse_campaign(changed_text(fixed, open), "x.yaml");
+  EXPECT_EQ(read.repetitions_most, 5);
+  EXPECT_EQ(changed_text(read, fixed), fixed.text);
+}
+
 TEST(CampaignText, KeepsEverythingThatIsNotChanged) {
   const Campaign campaign = shipped();
   EXPECT_EQ(changed_text(campaign, campaign), campaign.text);

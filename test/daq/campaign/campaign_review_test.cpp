@@ -306,6 +306,62 @@ TEST_F(OrderedCampaign, EndsStepsThatAreCertainEnoughBeforeTheirTime) {
   for (const double held : held_s()) EXPECT_NEAR(held, 1.5, 0.02) << "never certain enough: held to its end";
 }
 
+/// 20 steps that end by themselves; as `repetitions` and `order` say.
+profiles::Campaign until(std::string text, const std::string& repetitions, const std::string& k_percent) {
+  const auto change = [&](const std::string& from, const std::string& to) {
+    text.replace(text.find(from), from.size(), to);
+  };
+  change("repetitions: 2", "repetitions: " + repetitions);
+  change("steps: 4, dwell_s: 1.4", "steps: 20, dwell_s: [0.9, 4], until: {k_percent: " + k_percent + "}");
+  change("minimum_discard_s: 0.6", "minimum_discard_s: 0.3");
+  return profiles::parse_campaign(text, "until.yaml");
+}
+
+TEST_F(OrderedCampaign, LeavesOutStepsThatItsKDoesNotNeed) {
+  (void)run(until(campaign("0", 2, "").text, "2", "0.5"));
+  for (const json& accepted : journaled("run_accepted")) {
+    EXPECT_EQ(accepted.at("steps_not_needed"), 9) << "every second, but the fastest";
+    EXPECT_FALSE(accepted.contains("steps_left_out")) << "all could be reached";
+  }
+  EXPECT_EQ(speeds_rpm(runs().at(0)).size(), 11u);
+  EXPECT_EQ(speeds_rpm(runs().at(0)).front(), 9000);
+  EXPECT_EQ(speeds_rpm(runs().at(0)).back(), 15000);
+  EXPECT_EQ(speeds_rpm(runs().at(0)), speeds_rpm(runs().at(1)));
+  for (const auto& step : steps()) EXPECT_EQ(step.step % 2 == 0 || step.step == 19, true) << step.step;
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("0 of 11 steps flagged, 9 not needed")));
+  expect_whole();
+  (void)run(until(campaign("0", 2, "").text, "2", "0.01"));
+  EXPECT_EQ(speeds_rpm(runs().at(0)).size(), 20u) << "never certain enough";
+}
+
+TEST_F(OrderedCampaign, RunsAnOcclusionAgainWhileThatWouldMoveItsK) {
+  spoil_second_run();
+  const std::string text = campaign("0, 90", 2, "").text;
+  EXPECT_EQ(run(until(text, "[2, 4]", "0.5")).runs, 8) << "0° scatters, so 90° is not trusted either";
+  EXPECT_TRUE(person_.questions.empty()) << "the campaign file has decided";
+  const auto decided = journaled("another_run");
+  ASSERT_EQ(decided.size(), 4u);
+  EXPECT_EQ(decided[0].at("occlusion_deg"), 0);
+  EXPECT_EQ(decided[0].at("decided_by"), "campaign file");
+  EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^0°: another run would move k by up to [0-9.]+ %, "
+                                                           "0.5 % is enough: running it again, 3 of at most 4$")));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("not run again: 4 runs are the most")));
+  expect_whole();
+}
+
+TEST_F(OrderedCampaign, DoesNotRunAnOcclusionAgainThatIsKnown) {
+  EXPECT_EQ(run(until(campaign("0, 90", 2, "").text, "[2, 4]", "0.5")).runs, 4);
+  EXPECT_TRUE(journaled("another_run").empty());
+  EXPECT_THAT(said_.lines, Contains(testing::ContainsRegex("^90°: another run would move k by up to [0-9.]+ %, "
+                                                           "0.5 % is enough$")));
+}
+
+TEST_F(OrderedCampaign, RemountsForARunThatTheCampaignAdds) {
+  const std::string text = campaign("0", 2, "order: {remount_each_repetition: true}\n").text;
+  EXPECT_EQ(run(until(text, "[2, 3]", "0.01")).runs, 3) << "never that certain";
+  EXPECT_THAT(person_.mounted_deg, ElementsAre(0, 0, 0));
+}
+
 TEST_F(OrderedCampaign, TellsAfterEachRunWhatIsKnownSoFar) {
   campaign_ = campaign("0", 2, "order: {reference: true}\n");
   prepare();

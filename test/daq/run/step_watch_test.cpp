@@ -80,17 +80,5 @@ TEST(StepWatch, IsNotConfusedByRecordsOfThePhaseBefore) {
               0.7, 0.1);
 }
 
-TEST(GoodEnough, OfAllStepsMakesHalfOfTheWishedInterval) {
-  constexpr double kShare = 0.002, kK = 1.5e-6;
-  double squares = 0, variance = 0;
-  for (int i = 0; i < 40; ++i) squares += std::pow(300 + 42.0 * i, 4);
-  for (int i = 0; i < 40; ++i) {
-    const double x = std::pow(300 + 42.0 * i, 2);
-    const double u = good_enough_n(kShare, kK * x, x, squares, 40);
-    variance += std::pow(x * u / squares, 2);
-  }
-  EXPECT_NEAR(2 * std::sqrt(variance) / kK, kShare / 2, 1e-9);
-}
-
 }  // namespace step_watch_test
 }  // namespace kphi::daq

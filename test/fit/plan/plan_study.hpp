@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,7 @@ struct SimulatedStand {
   double bend = 0;          ///< of k(φ) at half of the range, share of K_T
   double rise = 0;          ///< of k from the lowest to the highest speed, share
   double settle_s = 1;      ///< until the thrust stands
+  double thrust = 1;        ///< of the propeller, over that of CampaignTruth
 };
 
 inline const std::vector<SimulatedStand>& stands() {
@@ -71,7 +74,7 @@ inline std::size_t bins_in(double seconds) {
 inline double true_k(const SimulatedStand& stand, double phi_deg, double share = 0.5) {
   const CampaignTruth line;
   const double u = phi_deg / 270;
-  return (line.k(phi_deg) + (phi_deg > 0 ? stand.bend * line.K_T * 4 * u * (1 - u) : 0)) *
+  return (line.k(phi_deg) + (phi_deg > 0 ? stand.bend * line.K_T * 4 * u * (1 - u) : 0)) * stand.thrust *
          (1 + stand.rise * (share - 0.5));
 }
 
@@ -80,9 +83,11 @@ struct HeldStep {
   std::vector<double> bins_n;
   double discard_s = 0;
 };
-/// Holds a step of this thrust, the zero before the run being `zero_n`.
-using Hold =
-    std::function<HeldStep(const profiles::PlannedStep& step, double thrust_n, double zero_n, StandInTime& time)>;
+/// Holds a step of this thrust, the zero before the run being `zero_n`; nullopt: the run leaves it out.
+using Hold = std::function<std::optional<HeldStep>(const profiles::PlannedStep& step, double thrust_n, double zero_n,
+                                                   StandInTime& time)>;
+/// How the steps of a run are held.
+using HoldOfRun = std::function<Hold(const profiles::PlannedRun&)>;
 
 /// To the end of the campaign's dwell.
 inline Hold to_its_end(const profiles::Campaign& campaign, const SimulatedStand& stand) {
@@ -106,9 +111,10 @@ inline double simulate_run(const profiles::Campaign& campaign, const profiles::P
   for (const profiles::PlannedStep& step : planned.steps) {
     const double speed = step.speed.value(),
                  thrust = share * true_k(stand, planned.occlusion_deg, speed / top) * speed * speed;
-    const HeldStep held = hold(step, thrust, before.mean, time);
-    const std::vector<double> bins(held.bins_n.begin() + static_cast<std::ptrdiff_t>(bins_in(held.discard_s)),
-                                   held.bins_n.end());
+    const auto held = hold(step, thrust, before.mean, time);
+    if (!held) continue;
+    const std::vector<double> bins(held->bins_n.begin() + static_cast<std::ptrdiff_t>(bins_in(held->discard_s)),
+                                   held->bins_n.end());
     const results::MeanError mean = results::mean_error(results::without_trend(bins), 2);
     results::StepMean one = step_at(planned.occlusion_deg, planned.repetition, step.number);
     one.commanded_speed_rad_s = one.speed_rad_s = speed;
@@ -117,9 +123,9 @@ inline double simulate_run(const profiles::Campaign& campaign, const profiles::P
     one.thrust_u_n = mean.u;
     one.thrust_n_eff = static_cast<double>(one.thrust_samples) / mean.correlation;
     one.thrust_freedom = mean.freedom;
-    one.discarded_s = held.discard_s;
-    one.window_begin_s = now + held.discard_s;
-    now += static_cast<double>(held.bins_n.size()) * StandInTime::kBin;
+    one.discarded_s = held->discard_s;
+    one.window_begin_s = now + held->discard_s;
+    now += static_cast<double>(held->bins_n.size()) * StandInTime::kBin;
     one.window_end_s = now;
     one.thrust_sd_n = 0.05;
     steps.push_back(one);
@@ -139,15 +145,28 @@ inline double simulate_run(const profiles::Campaign& campaign, const profiles::P
   return now + campaign.zero.value();
 }
 
+/// Asked after each run of an occlusion that has its planned ones: whether to run its occlusion again.
+using AskAgain = std::function<bool(const std::vector<results::StepMean>& steps, double occlusion_deg)>;
+
 /// `bench_s`: how long the motor was on and zeros were taken.
 inline std::vector<results::StepMean> simulate(const profiles::Campaign& campaign, const SimulatedStand& stand,
-                                               std::uint64_t seed, const Hold& hold, double* bench_s = nullptr) {
+                                               std::uint64_t seed, const HoldOfRun& hold, double* bench_s = nullptr,
+                                               const AskAgain& again = {}) {
   Random random(seed);
   std::vector<results::StepMean> steps;
   double mounted = 1, lasted = 0;
-  for (const profiles::PlannedRun& run : profiles::make_plan(campaign, profiles::BenchConfig{}).runs) {
+  std::map<double, int> made;
+  const auto make = [&](const profiles::PlannedRun& run) {
     if (run.mount) mounted = 1 + stand.mounting * random.normal();
-    lasted += simulate_run(campaign, run, stand, mounted * (1 + stand.runs * random.normal()), hold, random, steps);
+    const double share = mounted * (1 + stand.runs * random.normal());
+    lasted += simulate_run(campaign, run, stand, share, hold(run), random, steps);
+    ++made[run.occlusion_deg];
+  };
+  for (const profiles::PlannedRun& run : profiles::make_plan(campaign, profiles::BenchConfig{}).runs) {
+    make(run);
+    const double phi = run.occlusion_deg;
+    while (again && made[phi] >= campaign.repetitions && again(steps, phi))
+      make(profiles::extra_run(campaign, phi, made[phi] + 1));
   }
   if (bench_s != nullptr) *bench_s += lasted;
   return steps;
@@ -155,7 +174,7 @@ inline std::vector<results::StepMean> simulate(const profiles::Campaign& campaig
 
 inline std::vector<results::StepMean> simulate(const profiles::Campaign& campaign, const SimulatedStand& stand,
                                                std::uint64_t seed) {
-  return simulate(campaign, stand, seed, to_its_end(campaign, stand));
+  return simulate(campaign, stand, seed, [&](const auto&) { return to_its_end(campaign, stand); });
 }
 
 /// The paper's campaign, changed.

@@ -84,6 +84,24 @@ TEST(Prediction, SeesSmallerBendsWithMoreOcclusions) {
   EXPECT_TRUE(std::isinf(Prediction(planned_campaign({0, 45, 270}), known_stand(), {}).bend_seen()));
 }
 
+TEST(AsExpected, OfAQuietStandHoldsEverySecondStepForTheShortestTime) {
+  profiles::Campaign campaign = planned_campaign();
+  campaign.profile.dwell = Seconds(4);
+  campaign.profile.until = profiles::Until{0.002, Seconds(0.7)};
+  StandNoise noise = known_stand();
+  noise.settle_s = 0.2;
+  noise.noise_n = 0.0005;
+  const profiles::Campaign quiet = as_expected(campaign, noise);
+  EXPECT_EQ(quiet.profile.steps, 21);
+  EXPECT_NEAR(quiet.profile.dwell.value(), 0.7, 1e-9);
+  EXPECT_FALSE(quiet.profile.until);
+  noise.noise_n = 0.05;
+  const profiles::Campaign loud = as_expected(campaign, noise);
+  EXPECT_EQ(loud.profile.steps, 40);
+  EXPECT_GT(loud.profile.dwell.value(), 1.5);
+  EXPECT_EQ(as_expected(quiet, noise).profile.dwell.value(), quiet.profile.dwell.value()) << "without until as written";
+}
+
 TEST(Prediction, RefusesWhatCannotBePredicted) {
   EXPECT_THROW(Prediction(planned_campaign({45, 90, 270}), known_stand(), {}), ConfigurationError) << "no K_T";
   EXPECT_THROW(Prediction(planned_campaign(), StandNoise{}, {}), ConfigurationError) << "nothing known";
