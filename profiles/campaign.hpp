@@ -40,6 +40,7 @@ struct Propeller {
 struct Until {
   double k_share = 0;   ///< half of the 95 % interval of the k of a run, and of how far another run would move it
   Seconds dwell_least;  ///< no step ends before
+  bool operator==(const Until&) const = default;
 };
 
 /// Commanded speeds of one run, held `dwell` each, with `until` at most so long. The levels are evenly spaced and

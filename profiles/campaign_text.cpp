@@ -74,6 +74,13 @@ class Editor {
   std::string text_, path_;
 };
 
+/// The seconds alone, or least and most.
+std::string dwell(const StepProfile& profile) {
+  const double most_s = profile.dwell.value();
+  return profile.until ? fmt::format("[{:g}, {:g}]", profile.until->dwell_least.value(), most_s)
+                       : fmt::format("{:g}", most_s);
+}
+
 std::string number(double value) { return fmt::format("{:g}", value); }
 
 }  // namespace
@@ -90,17 +97,18 @@ std::string changed_text(const Campaign& campaign, const Campaign& wanted) {
     editor.set("/order", "remount_each_repetition", wanted.order.remount_each_repetition ? "true" : "false");
   if (wanted.profile.steps != campaign.profile.steps)
     editor.set("/profile", "steps", std::to_string(wanted.profile.steps));
-  if (wanted.profile.dwell.value() != campaign.profile.dwell.value())
-    editor.set("/profile", "dwell_s", number(wanted.profile.dwell.value()));
+  if (wanted.profile.until != campaign.profile.until || wanted.profile.dwell != campaign.profile.dwell)
+    editor.set("/profile", "dwell_s", dwell(wanted.profile));
+  if (wanted.profile.until && wanted.profile.until != campaign.profile.until)
+    editor.set("/profile", "until", fmt::format("{{k_percent: {:g}}}", 100 * wanted.profile.until->k_share));
   if (wanted.zero.value() != campaign.zero.value()) editor.set("", "zero_s", number(wanted.zero.value()));
   if (wanted.name != campaign.name) editor.set("", "name", wanted.name);
   const Campaign read = parse_campaign(editor.text(), campaign.path);
   if (read.occlusions_deg != wanted.occlusions_deg || read.repetitions != wanted.repetitions ||
       read.repetitions_most != wanted.repetitions_most ||
       read.order.remount_each_repetition != wanted.order.remount_each_repetition ||
-      read.profile.until.has_value() != wanted.profile.until.has_value() ||
-      read.profile.steps != wanted.profile.steps || read.profile.dwell.value() != wanted.profile.dwell.value() ||
-      read.zero.value() != wanted.zero.value())
+      read.profile.until != wanted.profile.until || read.profile.steps != wanted.profile.steps ||
+      read.profile.dwell.value() != wanted.profile.dwell.value() || read.zero.value() != wanted.zero.value())
     throw ConfigurationError(campaign.path +
                              ": its layout does not let the new values in; write each key on a line of its own");
   return editor.text();

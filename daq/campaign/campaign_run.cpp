@@ -153,10 +153,17 @@ class CampaignRun {
     note(results::kCampaignResumed, identity);
     for (const std::string& change : changes) progress_.say("resuming although " + change);
     for (const std::string& file : aside) progress_.say("unfinished run kept as " + file);
+    std::optional<double> before_deg;  // of the run before
     for (const results::AcceptedRun& run : resumption.state.accepted) {
       const auto file = folder_.path() / run.file;
       const results::RunRecording recording = results::read_run(file);
       const std::vector<results::StepMean> means = reduce(recording);
+      const double occlusion_deg = recording.header.occlusion_deg;
+      const bool is_reference = recording.header.repetition < 0;
+      // What came after an occlusion was whole shows that its repetitions were found to do.
+      if (before_deg && (is_reference || occlusion_deg != *before_deg) && is_whole(*before_deg))
+        judged_.insert(*before_deg);
+      before_deg = is_reference ? std::nullopt : std::optional(occlusion_deg);
       review_.restore(means);
       count(file, recording, means);
       accepted_at_ = Instant(run.time_ns);
@@ -174,6 +181,11 @@ class CampaignRun {
 
   [[nodiscard]] bool is_accepted(const profiles::PlannedRun& planned) const {
     return accepted_.contains(file_of(planned).filename().string());
+  }
+
+  /// All planned repetitions are there.
+  [[nodiscard]] bool is_whole(double occlusion_deg) const {
+    return review_.repetitions(occlusion_deg) >= campaign_.repetitions;
   }
 
   void execute_run(const profiles::PlannedRun& planned) {
@@ -212,7 +224,7 @@ class CampaignRun {
 
   /// Once all repetitions are there: adds runs while they disagree and the operator agrees, or the campaign says so.
   void add_repetitions(double occlusion_deg) {
-    if (review_.repetitions(occlusion_deg) < campaign_.repetitions || !judged_.insert(occlusion_deg).second) return;
+    if (!is_whole(occlusion_deg) || !judged_.insert(occlusion_deg).second) return;
     while (const auto question = review_.another(occlusion_deg)) {
       const bool yes = question->decided || ask_for_another(*question);
       note("another_run", {{"occlusion_deg", occlusion_deg},

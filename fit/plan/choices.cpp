@@ -18,10 +18,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using profiles::Campaign;
+using profiles::StepProfile;
 
 constexpr int kLeastRepetitions = 2, kMostRepetitions = 8;
 constexpr std::size_t kMostInner = 6;
 constexpr double kBendToSee = 0.01;
+constexpr double kLongestDwell = 4;  // s, of steps that end by themselves
 
 /// Which occlusions are run: 0°, the ends, and every choice of what lies between.
 std::vector<std::vector<double>> occlusion_sets(std::vector<double> all) {
@@ -40,13 +42,25 @@ std::vector<std::vector<double>> occlusion_sets(std::vector<double> all) {
   return sets;
 }
 
-std::vector<double> dwells(const PlanQuestion& question) {
-  if (question.campaign.profile.until) return {question.campaign.profile.dwell.value()};  // it sets them itself
-  std::set<double> all{question.campaign.profile.dwell.value()};
+/// Ways to hold the steps: each for a time, and as long as k needs.
+std::vector<StepProfile> holdings(const PlanQuestion& question) {
+  const StepProfile& written = question.campaign.profile;
+  if (written.until) return {written};
   const double first = std::max(question.noise.settle_s, question.campaign.minimum_discard.value());
-  for (const double window : {results::kLeastWindow, 0.75, 1.0, 1.5, 2.0, 3.0})
-    all.insert(std::ceil(10 * (first + window) - 1e-9) / 10);
-  return {all.begin(), all.end()};
+  const auto seconds = [&](double window) { return std::ceil(10 * (first + window) - 1e-9) / 10; };
+  std::set<double> all{written.dwell.value()};
+  for (const double window : {results::kLeastWindow, 0.75, 1.0, 1.5, 2.0, 3.0}) all.insert(seconds(window));
+  std::vector<StepProfile> ways;
+  for (const double dwell_s : all) {
+    ways.push_back(written);
+    ways.back().dwell = Seconds(dwell_s);
+  }
+  for (const double k_share : {0.002, 0.0005}) {
+    ways.push_back(written);
+    ways.back().dwell = Seconds(std::max({kLongestDwell, written.dwell.value(), seconds(1)}));
+    ways.back().until = profiles::Until{k_share, Seconds(seconds(results::kLeastWindow))};
+  }
+  return ways;
 }
 
 std::vector<int> step_numbers(const Campaign& campaign) {
@@ -91,6 +105,21 @@ std::vector<Candidate> candidates(const PlanQuestion& question) {
   std::vector<Candidate> all;
   std::size_t kind = 0;
   const auto zeros = std::set<double>{question.campaign.zero.value(), 1, 2, 4};
+  struct Steps {
+    StepProfile profile;
+    double run_s;  ///< motor on
+  };
+  std::vector<Steps> ways;
+  for (const int steps : step_numbers(question.campaign)) {
+    for (const StepProfile& way : holdings(question)) {
+      Campaign campaign = question.campaign;
+      campaign.profile = way;
+      campaign.profile.steps = steps;
+      const StepProfile held = as_expected(campaign, question.noise).profile;
+      const int back = campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1;
+      ways.push_back({campaign.profile, held.steps * held.dwell.value() * back});
+    }
+  }
   for (const auto& occlusions_deg : occlusion_sets(question.campaign.occlusions_deg)) {
     for (const bool remounts : {false, true}) {
       Campaign campaign = question.campaign;
@@ -101,18 +130,13 @@ std::vector<Candidate> candidates(const PlanQuestion& question) {
         campaign.repetitions = repetitions;
         const int runs = repetitions * static_cast<int>(occlusions_deg.size()) + (campaign.order.reference ? 2 : 0);
         const int mountings = remounts ? runs : static_cast<int>(occlusions_deg.size());
-        for (const int steps : step_numbers(question.campaign))
-          for (const double dwell : dwells(question))
-            for (const double zero : zeros) {
-              campaign.profile.steps = steps;
-              campaign.profile.dwell = Seconds(dwell);
-              campaign.zero = Seconds(zero);
-              const profiles::StepProfile held = as_expected(campaign, question.noise).profile;
-              const double run_s = held.steps * held.dwell.value() *
-                                       (campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1) +
-                                   (campaign.box_bias ? 4 : 2) * zero;
-              all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
-            }
+        for (const Steps& way : ways)
+          for (const double zero : zeros) {
+            campaign.profile = way.profile;
+            campaign.zero = Seconds(zero);
+            const double run_s = way.run_s + (campaign.box_bias ? 4 : 2) * zero;
+            all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
+          }
       }
       ++kind;
     }
@@ -126,7 +150,9 @@ Choice largest(const PlanQuestion& question, const std::vector<Wanted>& told) {
   Campaign campaign = question.campaign;
   campaign.repetitions = std::max(kMostRepetitions, campaign.repetitions);
   campaign.order.remount_each_repetition = true;
-  campaign.profile.dwell = Seconds(dwells(question).back());
+  campaign.profile.dwell = Seconds(std::ranges::max(holdings(question), {}, [](const StepProfile& way) {
+                                     return way.until ? 0 : way.dwell.value();
+                                   }).dwell.value());
   campaign.zero = Seconds(std::max(4.0, campaign.zero.value()));
   Choice choice = cost_of(question, campaign);
   predict(question, told, choice);

@@ -52,10 +52,10 @@ struct PlanAnswer {
 };
 inline constexpr std::size_t kMostChoices = 6;
 
-/// Searches repetitions (2 to 8), remounting, number of speeds, dwell, zeros, and which of the campaign's occlusions
-/// are run: always 0°, the smallest and the widest, and where there are three or more one between them, so that k(φ)
-/// can be seen to bend. No choice sees a smaller bend worse than the campaign as written does or 1 % of K_T, the larger
-/// of the two. Throws ConfigurationError as Prediction does.
+/// Searches repetitions (2 to 8), remounting, number of speeds, dwell, steps that end by themselves, zeros, and which
+/// of the campaign's occlusions are run: always 0°, the smallest and the widest, and where there are three or more one
+/// between them, so that k(φ) can be seen to bend. No choice sees a smaller bend worse than the campaign as written
+/// does or 1 % of K_T, the larger of the two. Throws ConfigurationError as Prediction does.
 [[nodiscard]] PlanAnswer answer(const PlanQuestion& question);
 
 /// A table of choices with minutes, mountings and what each tells; then what limits each number.

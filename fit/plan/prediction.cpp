@@ -18,7 +18,7 @@
 namespace kphi::fit {
 namespace {
 
-constexpr double kTick = 0.02;  // s
+constexpr double kTick = 0.01;  // s
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 bool is_fitted(const profiles::PlannedStep& step) { return to_rpm(step.speed) >= kSpeedMinRpm; }
@@ -139,10 +139,14 @@ profiles::Campaign as_expected(profiles::Campaign campaign, const StandNoise& no
     }
     const double thrust_n = noise.k_at(0) * step.speed.value() * step.speed.value();
     const double enough_n = certainty.enough_n(step, thrust_n);
-    double dwell_s = least_s;
-    const auto u_n = [&] { return noise.step_n(thrust_n, dwell_s - noise.settle_s); };
-    while (dwell_s < profile.dwell.value() && !(u_n() <= enough_n)) dwell_s += kTick;
-    certainty.held(step, thrust_n, u_n(), dwell_s);
+    const auto u_n = [&](double dwell_s) { return noise.step_n(thrust_n, dwell_s - noise.settle_s); };
+    double dwell_s = least_s, longest_s = profile.dwell.value();
+    while (longest_s - dwell_s > kTick && !(u_n(dwell_s) <= enough_n)) {
+      const double middle_s = 0.5 * (dwell_s + longest_s);
+      (u_n(middle_s) <= enough_n ? longest_s : dwell_s) = middle_s;
+    }
+    if (!(u_n(dwell_s) <= enough_n)) dwell_s = longest_s;
+    certainty.held(step, thrust_n, u_n(dwell_s), dwell_s);
     held_s += dwell_s;
     ++held;
   }

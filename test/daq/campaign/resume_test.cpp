@@ -126,6 +126,15 @@ TEST_F(Resume, CutsATornLastLineOfTheJournal) {
   EXPECT_EQ(journal().back().event, "campaign_finished");
 }
 
+// Later runs would change what was asked of an occlusion, and its plate is no longer mounted.
+TEST_F(Resume, DoesNotJudgeAgainTheRepetitionsOfAnOcclusionThatAnotherFollowed) {
+  stop_before(180);
+  (void)resume();
+  std::map<double, int> judged;
+  for (const auto& verdict : journaled("repetitions_judged")) ++judged[verdict.at("occlusion_deg").get<double>()];
+  EXPECT_EQ(judged, (std::map<double, int>{{0, 1}, {90, 2}, {180, 1}})) << "it stopped just after 90°";
+}
+
 TEST_F(Resume, BeginsWhatHadOnlyAFolder) {
   results::Journal(results_->journal());
   (void)resume();

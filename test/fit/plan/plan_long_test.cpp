@@ -2,7 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include "test/fit/plan/plan_study.hpp"
+#include "test/fit/plan/until_study.hpp"
 
 namespace kphi::fit {
 namespace plan_long_test {
@@ -25,6 +25,40 @@ TEST(TwoHundredCampaigns, ScatterAsThePlanSaidWithinFifteenPercent) {
                             100 * found[i].scatter / std::abs(budget.value));
         EXPECT_GT(ratio, 0.85) << stand.name << ", campaign " << number << ", " << found[i].name;
         EXPECT_LT(ratio, 1.15) << stand.name << ", campaign " << number << ", " << found[i].name;
+      }
+      fmt::print("{}\n", line);
+    }
+  }
+}
+
+// The pilots have the paper's protocol, whose steps wait 1 s for the thrust; the stand settles in 0.2 s. Where noise
+// remembers 1 s, neighbours among the shorter steps are more alike than the pilots' were: the plan says 22 % too
+// little.
+TEST(TwoHundredCampaigns, ThatTakeNoMoreTimeThanKNeedsScatterAsThePlanSaid) {
+  using Kind = Wanted::Kind;
+  const std::vector<Wanted> told{{Kind::thrust_coefficient, 0}, {Kind::slope, 0}, {Kind::k, 135}};
+  for (const SimulatedStand& stand : stands()) {
+    StandNoise noise = piloted(stand, 60, 7000);
+    noise.settle_s = kDiscard;
+    for (const int repetitions : {2, 3}) {
+      const profiles::Campaign campaign =
+          with_until(planned_campaign({0, 45, 90, 180, 270}, repetitions, stand.mounting > 0));
+      const Prediction prediction(campaign, noise, {});
+      double bench_s = 0;
+      const std::vector<Found> found = found_by(campaign, stand, 200, told, 50'000, until_certain, &bench_s);
+      const double minutes = profiles::make_plan(as_expected(campaign, noise), {}).bench.value() / 60;
+      std::string line = fmt::format("{:<34} {} repetitions  {:.2f} min predicted, {:.2f} min found", stand.name,
+                                     repetitions, minutes, bench_s / 60 / 200);
+      EXPECT_NEAR(minutes, bench_s / 60 / 200, 0.15 * minutes) << stand.name;
+      for (std::size_t i = 0; i < told.size(); ++i) {
+        const Budget budget = prediction.of(told[i]);
+        const double ratio = budget.combined() / found[i].scatter;
+        line += fmt::format("  {} {:.4f} % predicted, {:.4f} % found", found[i].name,
+                            100 * budget.combined() / std::abs(budget.value),
+                            100 * found[i].scatter / std::abs(budget.value));
+        EXPECT_GT(ratio, stand.memory_s > 0 ? 0.75 : 0.85)
+            << stand.name << ", " << repetitions << ", " << found[i].name;
+        EXPECT_LT(ratio, 1.15) << stand.name << ", " << repetitions << ", " << found[i].name;
       }
       fmt::print("{}\n", line);
     }

@@ -232,7 +232,8 @@ inline double value_of(const Wanted& wanted, const Fitted& fitted, double* u = n
 }
 
 inline std::vector<Found> found_by(const profiles::Campaign& campaign, const SimulatedStand& stand, int n,
-                                   const std::vector<Wanted>& told, std::uint64_t seed) {
+                                   const std::vector<Wanted>& told, std::uint64_t seed, const HoldOfRun& hold = {},
+                                   double* bench_s = nullptr) {
   std::vector<std::vector<double>> values(told.size());
   std::vector<Found> found(told.size());
   for (int i = 0; i < n; ++i) {
@@ -241,7 +242,11 @@ inline std::vector<Found> found_by(const profiles::Campaign& campaign, const Sim
     IdentificationOptions known;
     known.mounted_once = !campaign.order.remount_each_repetition;
     if (known.mounted_once) known.mounting = stand.mounting;
-    Identification identification = identify(simulate(campaign, stand, seed + static_cast<std::uint64_t>(i)), known);
+    Identification identification =
+        identify(simulate(
+                     campaign, stand, seed + static_cast<std::uint64_t>(i),
+                     hold ? hold : [&](const auto&) { return to_its_end(campaign, stand); }, bench_s),
+                 known);
     Analysis analysis = analyse(identification, options);
     const Fitted fitted{std::move(identification), std::move(analysis)};
     for (std::size_t j = 0; j < told.size(); ++j) {

@@ -3,49 +3,16 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <memory>
 #include <set>
 
-#include "daq/run/step_watch.hpp"
-#include "profiles/run_certainty.hpp"
 #include "results/reduction/next_run.hpp"
-#include "test/fit/plan/plan_study.hpp"
+#include "test/fit/plan/until_study.hpp"
 
 namespace kphi::fit {
 namespace until_long_test {
 
 constexpr int kCampaigns = 1000;
-constexpr double kMost = 4, kDiscard = 0.2, kRise = 0.03;  // s; the thrust rises as the motor does
-constexpr profiles::Until kUntil{0.002, Seconds(0.7)};
 constexpr std::size_t kMostRuns = 5;
-
-/// By the functions of the bench.
-Hold until_certain(const profiles::PlannedRun& run) {
-  auto certainty = std::make_shared<profiles::RunCertainty>(kUntil, run.steps);
-  return [certainty](const profiles::PlannedStep& step, double thrust_n, double zero_n,
-                     StandInTime& time) -> std::optional<HeldStep> {
-    if (!certainty->needs(step)) {
-      certainty->left_out(step);
-      return std::nullopt;
-    }
-    daq::StepWatch watch(kDiscard, kMost);
-    HeldStep held{{}, kDiscard + StandInTime::kBin};
-    double sum = 0, since = 0;
-    while (held.bins_n.size() < bins_in(kMost)) {
-      since = static_cast<double>(held.bins_n.size() + 1) * StandInTime::kBin;
-      held.bins_n.push_back(time.next(1).front() + thrust_n * (1 - std::exp(-since / kRise)));
-      sum += held.bins_n.back();
-      const auto n = held.bins_n.size();
-      watch.add(since, 350 * n, sum / static_cast<double>(n));
-      if (since < kUntil.dwell_least.value()) continue;
-      const auto [mean_n, u_n] = watch.known();
-      if (u_n <= certainty->enough_n(step, mean_n - zero_n)) break;
-    }
-    const auto [mean_n, u_n] = watch.known();
-    certainty->held(step, mean_n - zero_n, u_n, since);
-    return held;
-  };
-}
 
 bool while_it_moves_k(const std::vector<results::StepMean>& steps, double occlusion_deg) {
   const auto verdicts = results::judge_repetitions(steps);
