@@ -34,6 +34,8 @@ void take_journal(const fs::path& file, CampaignSummary& summary) {
   summary.started_utc = journal.entries.front().utc;
   const results::CampaignState state = results::state_of(journal);
   summary.runs = state.accepted.size();
+  for (const results::AcceptedRun& run : state.accepted)
+    summary.not_needed += static_cast<std::size_t>(std::max(0, run.steps_not_needed));
   summary.finished = state.finished;
   summary.safety_stop = state.safety_stop;
 }
@@ -98,7 +100,7 @@ Json to_json(const CampaignSummary& summary) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
   Json json;
   KPHI_JSON_MEMBERS(json, summary, folder, started_utc, campaign, propeller, operator_name, runs, planned, steps,
-                    flagged, finished, safety_stop, verdict, damage);
+                    flagged, not_needed, finished, safety_stop, verdict, damage);
   json["K_T"] = number(summary.K_T);
   json["expanded_95"] = number(summary.expanded_95);
   json["next"] = summary.next();
@@ -114,7 +116,9 @@ std::string to_text(const CampaignSummary& summary) {
   line("campaign", summary.campaign);
   line("propeller", summary.propeller);
   line("runs", summary.progress() + (summary.finished || summary.started_utc.empty() ? "" : ", not finished"));
-  if (summary.steps > 0) line("steps", fmt::format("{}, {} of them flagged", summary.steps, summary.flagged));
+  if (summary.steps > 0)
+    line("steps", fmt::format("{}, {} of them flagged", summary.steps, summary.flagged) +
+                      (summary.not_needed > 0 ? fmt::format("; {} not needed", summary.not_needed) : ""));
   line("safety stop", summary.safety_stop);
   line("K_T", summary.coefficient() + (summary.K_T ? " N/(rad/s)^2" : ""));
   line("verdict", summary.verdict);

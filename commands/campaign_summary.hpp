@@ -16,6 +16,7 @@ struct CampaignSummary {
   std::string campaign, propeller, operator_name;
   std::size_t runs = 0, planned = 0;   ///< accepted; 0 planned: unknown
   std::size_t steps = 0, flagged = 0;  ///< of steps.csv
+  std::size_t not_needed = 0;          ///< steps that runs left out because k was certain enough
   bool finished = false;
   std::string safety_stop;                 ///< its reason; empty: none, or resumed since
   std::optional<double> K_T, expanded_95;  ///< N/(rad/s)²; nullopt: not fitted

@@ -183,6 +183,10 @@ CampaignState state_of(const JournalReading& journal) {
     const auto found = entry.data.find(key);
     return found != entry.data.end() && found->is_string() ? found->get<std::string>() : std::string();
   };
+  const auto number = [](const JournalEntry& entry, const char* key) {
+    const auto found = entry.data.find(key);
+    return found != entry.data.end() && found->is_number_integer() ? found->get<int>() : 0;
+  };
   CampaignState state;
   for (const JournalEntry& entry : journal.entries) {
     if (entry.event == kCampaignStarted || entry.event == kCampaignResumed) state.identity = entry.data;
@@ -193,7 +197,10 @@ CampaignState state_of(const JournalReading& journal) {
     }
     state.finished = entry.event == kCampaignFinished;
     if (entry.event != kRunAccepted) continue;
-    AcceptedRun run{text(entry, "file"), {text(entry, "sha256"), text(entry, "contents_xxh128")}, entry.time_ns};
+    AcceptedRun run{text(entry, "file"),
+                    {text(entry, "sha256"), text(entry, "contents_xxh128")},
+                    entry.time_ns,
+                    number(entry, "steps_not_needed")};
     if (!run.file.empty() && !run.digests.sha256.empty()) state.accepted.push_back(std::move(run));
   }
   return state;

@@ -68,7 +68,8 @@ class CampaignFolder {
 struct AcceptedRun {
   std::string file;  ///< relative to the campaign's folder
   RunDigests digests;
-  Nanoseconds time_ns = 0;  ///< bench time of its acceptance
+  Nanoseconds time_ns = 0;   ///< bench time of its acceptance
+  int steps_not_needed = 0;  ///< left out because k was certain enough without them
 };
 
 struct CampaignState {

@@ -159,8 +159,8 @@ CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, De
   const auto bench = connect_awake(config, stop_asked);
   const std::vector<BenchFinding> findings =
       audit_bench(*bench, campaign, config);  // faults throw before a folder is made
-  const auto bytes =
-      static_cast<std::uint64_t>(destination.share_left(plan) * static_cast<double>(bytes_needed(plan, config)));
+  const auto bytes = static_cast<std::uint64_t>(
+      destination.share_left(plan) * static_cast<double>(bytes_needed(longest_plan(campaign, config), config)));
   results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
   if (!destination.folder) destination.create(options, campaign, *bench);
   PrintedProgress printed(stderr, has_terminal());

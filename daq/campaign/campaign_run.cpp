@@ -193,8 +193,10 @@ class CampaignRun {
     bench_.begin_run(
         {planned.occlusion_deg, planned.repetition, campaign_.order.remount_each_repetition, accepted_at_});
     const auto file = file_of(planned);
-    const double per_run_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
-    const double remaining_s = per_run_s * (planned_ - result_.runs);
+    const double planned_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
+    const Instant begun = bench_.clock().now();
+    // This one may take all that is planned; those after it as long as the one before, if runs end by themselves.
+    const double remaining_s = planned_s + last_run_s_.value_or(planned_s) * (planned_ - result_.runs - 1);
     profiles::PlannedRun capped = planned;
     review_.cap().apply(capped.steps);
     try {
@@ -212,7 +214,9 @@ class CampaignRun {
                            static_cast<int>(result_.runs) + 1,
                            static_cast<int>(planned_)};
       (void)keep(&Bench::keep_prompt, "may_be_late");  // asked for again by the run itself: only to tell a refusal
-      accept(record_run(bench_, order, progress_, stop_asked_), planned);
+      const RunResult recorded = record_run(bench_, order, progress_, stop_asked_);
+      if (campaign_.profile.until) last_run_s_ = to_seconds(bench_.clock().now() - begun);
+      accept(recorded, planned);
     } catch (...) {
       const auto cause = std::current_exception();
       note_the_end(results::kRunAborted, {{"run", file.filename().string()},
@@ -401,10 +405,11 @@ class CampaignRun {
   const profiles::Plan plan_;
   results::Journal journal_;
   CampaignReview review_;
-  int planned_;                     ///< runs, with those that were added
-  std::set<double> judged_;         ///< occlusions with all repetitions
-  std::set<std::string> accepted_;  ///< names of files
-  Instant accepted_at_{0};          ///< the last of them
+  int planned_;                       ///< runs, with those that were added
+  std::set<double> judged_;           ///< occlusions with all repetitions
+  std::set<std::string> accepted_;    ///< names of files
+  Instant accepted_at_{0};            ///< the last of them
+  std::optional<double> last_run_s_;  ///< bench time of the last run, where steps end by themselves
   std::optional<MountConfirmation> mounted_;
   std::set<std::string> refused_;  ///< what this computer did not grant; the operator was told
   CampaignResult result_;

@@ -107,7 +107,7 @@ class Checks {
     const double left = shortest_dwell(campaign_.profile).value() - campaign_.minimum_discard.value();
     const std::string words = fmt::format("{:g} s of each step averaged after minimum_discard_s, zeros of {:g} s", left,
                                           campaign_.zero.value());
-    warn_if(left < results::kLeastWindow, "averages", words,
+    warn_if(left < results::kLeastWindow - 1e-9, "averages", words,
             fmt::format("at least {:g} s needed to see the thrust settle", results::kLeastWindow));
   }
 
@@ -225,6 +225,16 @@ std::string runs_text(const profiles::Plan& plan, const Campaign& campaign) {
   return text;
 }
 
+/// The runs that are not in the list.
+std::string more_text(const Campaign& campaign) {
+  const int more = campaign.repetitions_extra_max;
+  const std::string runs = more == 1 ? "1 run" : fmt::format("{} runs", more);
+  return campaign.repetitions_most
+             ? fmt::format("; in it at most {} more per occlusion, while one would move its k by over {:g} %", runs,
+                           100 * campaign.profile.until->k_share)
+             : fmt::format(", and at most {} more per occlusion if repetitions disagree", runs);
+}
+
 const char* mark_of(const PlanCheck& check) {
   if (check.finding.severity == Severity::fault) return "REFUSED";
   if (check.finding.severity == Severity::warning) return "WARN";
@@ -269,6 +279,11 @@ std::ptrdiff_t DryRun::refused() const {
                                [](const PlanCheck& check) { return check.finding.severity == Severity::fault; });
 }
 
+profiles::Plan longest_plan(Campaign campaign, const profiles::BenchConfig& config) {
+  campaign.repetitions = campaign.repetitions_most.value_or(campaign.repetitions);
+  return profiles::make_plan(campaign, config);
+}
+
 std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config) {
   const auto readings = static_cast<std::uint64_t>(2 * config.iq.telemetry_hz * plan.bench.value());
   return results::RunWriter::bytes_needed(plan.samples, readings);
@@ -278,7 +293,7 @@ DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, co
                const std::optional<profiles::Answers>& answers, results::FileLayer& files) {
   DryRun dry;
   dry.plan = profiles::make_plan(campaign, config);
-  dry.bytes_needed = bytes_needed(dry.plan, config);
+  dry.bytes_needed = bytes_needed(longest_plan(campaign, config), config);
   const std::filesystem::path folder = existing(out);
   dry.bytes_free = files.free_bytes(folder);
   Checks checks(campaign, config);
@@ -301,36 +316,38 @@ DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, co
 
 std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& config, const profiles::Plan& plan) {
   const auto& profile = campaign.profile;
+  const profiles::Plan most = longest_plan(campaign, config);
+  const auto range = [](auto from, auto to) {
+    return from == to ? fmt::format("{}", to) : fmt::format("{} to {}", from, to);
+  };
   std::string angles;
   for (const double angle : campaign.occlusions_deg) angles += fmt::format(" {:g}°", angle);
   return fmt::format(
-      "{}: propeller {} ({}), occlusions{}, {}{} repetitions\n"
-      "  {} runs of {} steps, {:.0f} to {:.0f} RPM, {} each; {} mountings\n"
+      "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
+      "  {} runs of {}{} steps, {:.0f} to {:.0f} RPM, {} each; {} mountings\n"
       "  {}{} spinning, {} on the bench{}, {:.1f} million samples, {}",
-      campaign.name, campaign.propeller.id, campaign.propeller.name, angles, campaign.repetitions,
-      campaign.repetitions_most ? fmt::format(" to {}", *campaign.repetitions_most) : "", plan.runs.size(),
-      plan.runs.front().steps.size(), to_rpm(profile.first), to_rpm(profile.last),
+      campaign.name, campaign.propeller.id, campaign.propeller.name, angles,
+      range(campaign.repetitions, campaign.repetitions_most.value_or(campaign.repetitions)),
+      range(plan.runs.size(), most.runs.size()), profile.until ? "at most " : "", plan.runs.front().steps.size(),
+      to_rpm(profile.first), to_rpm(profile.last),
       profile.until ? fmt::format("{:g} to {:g} s", profile.until->dwell_least.value(), profile.dwell.value())
                     : fmt::format("{:g} s", profile.dwell.value()),
-      plan.mountings, profile.until ? "at most " : "", minutes(plan.spinning.value()), minutes(plan.bench.value()),
+      range(plan.mountings, most.mountings), profile.until ? "at most " : "", minutes(most.spinning.value()),
+      minutes(most.bench.value()),
       time_scale(config) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(config)) : "",
-      1e-6 * static_cast<double>(plan.samples), gigabytes(bytes_needed(plan, config)));
+      1e-6 * static_cast<double>(most.samples), gigabytes(bytes_needed(most, config)));
 }
 
 std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
+  const profiles::Plan most = longest_plan(campaign, config);
   return fmt::format(
       "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
-      "spinning down{}, and at most {} more per occlusion {}\n\nchecks: {}\n{}\n"
-      "the motor coasts when the guard sees:\n  {}\n",
+      "spinning down{}{}\n\nchecks: {}\n{}\nthe motor coasts when the guard sees:\n  {}\n",
       plan_text(campaign, config, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
-      minutes(dry.plan.spinning.value()),
-      slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "",
-      minutes(dry.plan.bench.value()), campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "",
-      campaign.repetitions_extra_max == 1 ? "1 run" : fmt::format("{} runs", campaign.repetitions_extra_max),
-      campaign.repetitions_most
-          ? fmt::format("while one more would move its k by over {:g} %", 100 * campaign.profile.until->k_share)
-          : "if repetitions disagree",
+      (campaign.profile.until ? "at most " : "") + minutes(most.spinning.value()),
+      slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "", minutes(most.bench.value()),
+      campaign.limits.cooling ? ", pauses for cooling (of unknown length)" : "", more_text(campaign),
       fmt::format("{} refused, {} not checked", dry.refused(),
                   std::ranges::count(dry.checks, false, &PlanCheck::judged)),
       checks_text(dry.checks), fmt::join(to_lines(dry.limits), "\n  "));

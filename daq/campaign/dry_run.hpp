@@ -45,6 +45,8 @@ struct DryRun {
   [[nodiscard]] bool ok() const { return refused() == 0; }
 };
 
+/// With every run that it may have, where repetitions is a range.
+[[nodiscard]] profiles::Plan longest_plan(profiles::Campaign campaign, const profiles::BenchConfig& config);
 /// Bytes on disk that the runs of a plan take, with a margin.
 [[nodiscard]] std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config);
 
