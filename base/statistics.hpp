@@ -9,6 +9,8 @@
 
 namespace kphi {
 
+[[nodiscard]] constexpr double square(double x) { return x * x; }
+
 /// NaN if `values` is empty.
 [[nodiscard]] inline double mean(std::span<const double> values) {
   double sum = 0;

@@ -16,7 +16,7 @@
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/reduction/reduction.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/step_averages.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 

@@ -9,6 +9,9 @@
 #include "base/json.hpp"
 #include "results/digest.hpp"
 #include "results/reduction/next_run.hpp"
+#include "results/reduction/reference_drift.hpp"
+#include "results/reduction/step_averages.hpp"
+#include "results/reduction/two_ways.hpp"
 #include "results/steps_csv.hpp"
 
 namespace kphi::daq {

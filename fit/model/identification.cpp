@@ -10,7 +10,7 @@
 
 #include "base/error.hpp"
 #include "compensation/units.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
 namespace {

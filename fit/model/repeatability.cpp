@@ -5,6 +5,8 @@
 #include <map>
 
 #include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_scatter.hpp"
+#include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
 namespace {

@@ -9,6 +9,7 @@
 #include "fit/model/thrust_fit.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_zero.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {

@@ -13,7 +13,8 @@
 #include "profiles/plan.hpp"
 #include "profiles/run_certainty.hpp"
 #include "results/reduction/bin_statistics.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_scatter.hpp"
+#include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
 namespace {

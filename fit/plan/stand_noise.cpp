@@ -12,6 +12,8 @@
 #include "base/error.hpp"
 #include "fit/plan/memory.hpp"
 #include "fit/plan/run_differences.hpp"
+#include "results/reduction/run_scatter.hpp"
+#include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
 namespace {

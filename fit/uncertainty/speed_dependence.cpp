@@ -11,7 +11,7 @@
 #include "base/error.hpp"
 #include "base/statistics.hpp"
 #include "fit/numerics/linear_regression.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
 namespace {

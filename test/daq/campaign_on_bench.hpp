@@ -12,7 +12,7 @@
 #include "daq/virtual/deterministic_bench.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/step_averages.hpp"
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
 #include "test/daq/bench_fixture.hpp"

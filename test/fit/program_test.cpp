@@ -288,8 +288,8 @@ TEST_F(Program, FitsTheLinesThatNistCertified) {
     EXPECT_EQ(answer.code, 5) << "no drone flies on it";
     EXPECT_THAT(answer.err, HasSubstr("no coefficient file was written"));
     EXPECT_FALSE(std::filesystem::exists(folder_ / "coefficients.yaml"));
-    const auto json = nlohmann::json::parse(answer.out);
-    std::vector<nlohmann::json> terms{json["curve"]["intercept"], json["curve"]["slope_per_deg"]};
+    const json found = json::parse(answer.out);
+    std::vector<nlohmann::json> terms{found["curve"]["intercept"], found["curve"]["slope_per_deg"]};
     if (problem.through_origin) terms.erase(terms.begin());
     ASSERT_EQ(terms.size(), problem.certified.size());
     for (std::size_t i = 0; i < terms.size(); ++i) {

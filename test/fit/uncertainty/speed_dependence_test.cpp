@@ -5,7 +5,8 @@
 #include <map>
 #include <random>
 
-#include "results/reduction/repetitions.hpp"
+#include "results/reduction/run_scatter.hpp"
+#include "results/reduction/run_zero.hpp"
 #include "test/fit/bench_study.hpp"
 
 namespace kphi::fit {

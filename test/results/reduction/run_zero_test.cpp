@@ -1,0 +1,64 @@
+#include "results/reduction/run_zero.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "base/random.hpp"
+
+namespace kphi::results::run_zero_test {
+using namespace testing;
+
+/// Deviation of the weighted mean of a walk between two zeros about the line through them, and what SharedZero says.
+struct OfAWalk {
+  double found = 0, said = 0;
+};
+
+OfAWalk of_a_walk(const std::function<double(int step)>& weight, std::uint64_t seed) {
+  constexpr int kSteps = 40, kPieces = 10, kDraws = 4000;
+  Random random(seed);
+  SharedZero zero;
+  double weights = 0, squares = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    zero.add(kNotMeasured, i, i + 1, weight(i));
+    weights += weight(i);
+  }
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<double> walk{0};
+    for (int i = 0; i < kSteps * kPieces; ++i)
+      walk.push_back(walk.back() + random.normal() / std::sqrt(kSteps * kPieces));
+    double error = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const int middle = i * kPieces + kPieces / 2;
+      error +=
+          weight(i) / weights * (walk[static_cast<std::size_t>(middle)] - walk.back() * middle / (kSteps * kPieces));
+    }
+    squares += error * error / kDraws;
+  }
+  return {std::sqrt(squares), zero.u_n(1)};
+}
+
+TEST(SharedZero, OfAWalkIsAsUncertainAsTheWalkMakesIt) {
+  const OfAWalk even = of_a_walk([](int) { return 1.0; }, 1), rising = of_a_walk([](int i) { return i * i; }, 2);
+  EXPECT_NEAR(even.said, even.found, 0.05 * even.found);
+  EXPECT_NEAR(rising.said, rising.found, 0.05 * rising.found);
+  EXPECT_NEAR(even.said, 1 / std::sqrt(12), 0.01);
+  EXPECT_NEAR(rising.said, 0.283, 0.002) << "of ω² over rising speeds: no less than of even weights";
+  const OfAWalk last = of_a_walk([](int i) { return i == 39 ? 1.0 : 0; }, 3),
+                middle = of_a_walk([](int i) { return i == 20 ? 1.0 : 0; }, 4);
+  EXPECT_NEAR(last.said, 0.11, 0.01) << "beside the zero behind the run";
+  EXPECT_NEAR(middle.said, 0.5, 0.01);
+  EXPECT_NEAR(middle.said, middle.found, 0.05 * middle.found);
+}
+
+TEST(SharedZero, WithoutTimesIsThatOfARectangleAndAddsWhatWasMeasured) {
+  SharedZero zero;
+  for (int i = 0; i < 10; ++i) zero.add(0.003, 0, 0, 1);
+  EXPECT_NEAR(zero.u_n(0), 0.003, 1e-12);
+  EXPECT_NEAR(zero.u_n(0.012), std::hypot(0.003, 0.012 / std::sqrt(12)), 1e-12);
+  EXPECT_EQ(SharedZero().u_n(1), 0);
+}
+
+}  // namespace kphi::results::run_zero_test
