@@ -296,7 +296,7 @@ TEST_F(Program, FitsTheLinesThatNistCertified) {
       EXPECT_NEAR(terms[i]["value"].get<double>() / problem.certified[i][0], 1, 1e-10) << name;
       EXPECT_NEAR(terms[i]["u"].get<double>() / problem.certified[i][1], 1, 1e-10) << name;
     }
-    EXPECT_NEAR(json["scatter"].get<double>() / problem.residual_deviation, 1, 1e-10) << name;
+    EXPECT_NEAR(found["scatter"].get<double>() / problem.residual_deviation, 1, 1e-10) << name;
   }
 }
 
