@@ -204,6 +204,7 @@ Json to_json(const Choice& choice) {
                     {"limited_by", row == nullptr ? Json(nullptr) : Json(row->source)},
                     {"not_known", budget.not_known()}});
   }
+  const auto& until = one.profile.until;
   return {{"minutes", choice.minutes()},
           {"bench_min", choice.bench_min},
           {"mountings", choice.mountings},
@@ -214,6 +215,8 @@ Json to_json(const Choice& choice) {
           {"remount_each_repetition", one.order.remount_each_repetition},
           {"steps", one.profile.steps},
           {"dwell_s", one.profile.dwell.value()},
+          {"dwell_least_s", until ? Json(until->dwell_least.value()) : Json(nullptr)},
+          {"until_k_percent", until ? Json(100 * until->k_share) : Json(nullptr)},
           {"zero_s", one.zero.value()},
           {"bend_seen_share", std::isfinite(choice.bend_seen) ? Json(choice.bend_seen) : Json(nullptr)},
           {"told", told}};

@@ -50,11 +50,29 @@ TEST(Choices, FulfilEveryWishCheapestFirst) {
 TEST(Choices, CostWhatTheirPlanCosts) {
   const PlanQuestion asked = question({"slope 1 %"});
   for (const Choice& choice : answer(asked).choices) {
-    const profiles::Plan plan = profiles::make_plan(choice.campaign, asked.bench);
+    const profiles::Plan plan = profiles::make_plan(as_expected(choice.campaign, asked.noise), asked.bench);
     EXPECT_NEAR(choice.bench_min, plan.bench.value() / 60, 1e-9);
     EXPECT_EQ(choice.mountings, plan.mountings);
     EXPECT_NEAR(choice.mounting_min, 2.0 * plan.mountings, 1e-9);
   }
+}
+
+TEST(Choices, OfferStepsThatEndByThemselvesWhereTheyAreCheaper) {
+  PlanQuestion asked = question({"slope 0.3 %"});
+  asked.noise.noise_n = 0.02;
+  asked.noise.mounting = 0;
+  const PlanAnswer found = answer(asked);
+  const auto one = std::ranges::find_if(found.choices,
+                                        [](const Choice& choice) { return choice.campaign.profile.until.has_value(); });
+  ASSERT_NE(one, found.choices.end()) << answer_text(asked, found);
+  const profiles::Campaign expected = as_expected(one->campaign, asked.noise);
+  EXPECT_LT(one->bench_min, profiles::make_plan(one->campaign, asked.bench).bench.value() / 60);
+  EXPECT_NEAR(one->bench_min, profiles::make_plan(expected, asked.bench).bench.value() / 60, 1e-9);
+  EXPECT_THAT(answer_text(asked, found), HasSubstr("x ≤4 s"));
+  const auto json = nlohmann::json::parse(answer_json(asked, found));
+  EXPECT_EQ(json["as_written"]["until_k_percent"], nullptr);
+  EXPECT_EQ(json["choices"][static_cast<std::size_t>(one - found.choices.begin())]["until_k_percent"],
+            100 * one->campaign.profile.until->k_share);
 }
 
 TEST(Choices, ASmallerWishCostsMore) {
