@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
+#include <tuple>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/json.hpp"
@@ -69,23 +72,26 @@ std::vector<int> step_numbers(const Campaign& campaign) {
   return {all.begin(), all.end()};
 }
 
-Choice cost_of(const PlanQuestion& question, const Campaign& campaign) {
-  Choice choice;
-  choice.campaign = campaign;
-  const profiles::Plan plan = profiles::make_plan(as_expected(campaign, question.noise), question.bench);
+void add_cost(const PlanQuestion& question, Choice& choice) {
+  const profiles::Plan plan = profiles::make_plan(as_expected(choice.campaign, question.noise), question.bench);
   choice.bench_min = plan.bench.value() / 60;
   choice.mountings = plan.mountings;
   choice.mounting_min = question.minutes_per_mounting * plan.mountings;
   choice.runs = static_cast<int>(plan.runs.size());
   if (question.bytes) choice.bytes = question.bytes(plan);
-  return choice;
 }
 
-void predict(const PlanQuestion& question, const std::vector<Wanted>& told, Choice& choice) {
-  const Prediction prediction(choice.campaign, question.noise, question.uncertainty, question.curve);
-  choice.told.clear();
+/// `expected`: how the steps of this campaign are expected to be held. Without its cost.
+Choice predicted(const PlanQuestion& question, const std::vector<Wanted>& told, Campaign campaign,
+                 const StepProfile& expected) {
+  Choice choice;
+  const StepProfile written = std::exchange(campaign.profile, expected);
+  const Prediction prediction(campaign, question.noise, question.uncertainty, question.curve);
   for (const Wanted& wanted : told) choice.told.push_back(prediction.of(wanted));
   choice.bend_seen = prediction.bend_seen();
+  choice.campaign = std::move(campaign);
+  choice.campaign.profile = written;
+  return choice;
 }
 
 bool fulfils(const PlanQuestion& question, const Choice& choice, double bend) {
@@ -94,53 +100,66 @@ bool fulfils(const PlanQuestion& question, const Choice& choice, double bend) {
   return !(choice.bend_seen > bend);
 }
 
-/// A campaign to look at, with what it costs before anything of it is predicted.
-struct Candidate {
-  Campaign campaign;
-  std::size_t kind = 0;  ///< occlusions and remounting: of each kind the cheapest is of interest
-  double minutes = 0;
+/// A way to hold the steps of a run.
+struct Steps {
+  StepProfile profile, expected;  ///< as the file says, and as they are expected to be held
+  double run_s = 0;               ///< motor on, for one run
 };
 
-std::vector<Candidate> candidates(const PlanQuestion& question) {
-  std::vector<Candidate> all;
-  std::size_t kind = 0;
-  const auto zeros = std::set<double>{question.campaign.zero.value(), 1, 2, 4};
-  struct Steps {
-    StepProfile profile;
-    double run_s;  ///< motor on
-  };
+std::vector<Steps> ways_to_step(const PlanQuestion& question) {
   std::vector<Steps> ways;
+  Campaign campaign = question.campaign;
   for (const int steps : step_numbers(question.campaign)) {
     for (const StepProfile& way : holdings(question)) {
-      Campaign campaign = question.campaign;
       campaign.profile = way;
       campaign.profile.steps = steps;
-      const StepProfile held = as_expected(campaign, question.noise).profile;
+      const StepProfile expected = as_expected(campaign, question.noise).profile;
       const int back = campaign.order.steps == profiles::StepOrderKind::up_and_down ? 2 : 1;
-      ways.push_back({campaign.profile, held.steps * held.dwell.value() * back});
+      ways.push_back({campaign.profile, expected, expected.steps * expected.dwell.value() * back});
     }
   }
-  for (const auto& occlusions_deg : occlusion_sets(question.campaign.occlusions_deg)) {
-    for (const bool remounts : {false, true}) {
-      Campaign campaign = question.campaign;
-      campaign.occlusions_deg = occlusions_deg;
-      campaign.order.remount_each_repetition = remounts;
-      campaign.repetitions_most.reset();
-      for (int repetitions = kLeastRepetitions; repetitions <= kMostRepetitions; ++repetitions) {
-        campaign.repetitions = repetitions;
-        const int runs = repetitions * static_cast<int>(occlusions_deg.size()) + (campaign.order.reference ? 2 : 0);
-        const int mountings = remounts ? runs : static_cast<int>(occlusions_deg.size());
-        for (const Steps& way : ways)
-          for (const double zero : zeros) {
-            campaign.profile = way.profile;
-            campaign.zero = Seconds(zero);
-            const double run_s = way.run_s + (campaign.box_bias ? 4 : 2) * zero;
-            all.push_back({campaign, kind, runs * run_s / 60 + mountings * question.minutes_per_mounting});
+  return ways;
+}
+
+/// A campaign to look at, with what it costs before anything of it is predicted. There are ten thousands of them.
+struct Candidate {
+  const std::vector<double>* occlusions_deg = nullptr;
+  const Steps* steps = nullptr;
+  double zero_s = 0;
+  int repetitions = 0;
+  bool remounts = false;
+  double minutes = 0;
+
+  /// Of each kind the cheapest is of interest.
+  [[nodiscard]] auto kind() const { return std::pair(occlusions_deg, remounts); }
+  [[nodiscard]] auto but_for_repetitions() const { return std::tuple(occlusions_deg, remounts, steps, zero_s); }
+  [[nodiscard]] Campaign in(Campaign campaign) const {
+    campaign.occlusions_deg = *occlusions_deg;
+    campaign.profile = steps->profile;
+    campaign.zero = Seconds(zero_s);
+    campaign.repetitions = repetitions;
+    campaign.repetitions_most.reset();
+    campaign.order.remount_each_repetition = remounts;
+    return campaign;
+  }
+};
+
+/// Cheapest first; they point into `sets` and `ways`.
+std::vector<Candidate> candidates(const PlanQuestion& question, const std::vector<std::vector<double>>& sets,
+                                  const std::vector<Steps>& ways) {
+  const int zeros_of_run = question.campaign.box_bias ? 4 : 2, references = question.campaign.order.reference ? 2 : 0;
+  std::vector<Candidate> all;
+  for (const std::vector<double>& occlusions_deg : sets)
+    for (const bool remounts : {false, true})
+      for (int repetitions = kLeastRepetitions; repetitions <= kMostRepetitions; ++repetitions)
+        for (const Steps& steps : ways)
+          for (const double zero_s : std::set<double>{question.campaign.zero.value(), 1, 2, 4}) {
+            const int runs = repetitions * static_cast<int>(occlusions_deg.size()) + references;
+            const int mountings = remounts ? runs : static_cast<int>(occlusions_deg.size());
+            const double minutes =
+                runs * (steps.run_s + zeros_of_run * zero_s) / 60 + mountings * question.minutes_per_mounting;
+            all.push_back({&occlusions_deg, &steps, zero_s, repetitions, remounts, minutes});
           }
-      }
-      ++kind;
-    }
-  }
   std::ranges::stable_sort(all, {}, &Candidate::minutes);
   return all;
 }
@@ -154,9 +173,7 @@ Choice largest(const PlanQuestion& question, const std::vector<Wanted>& told) {
                                      return way.until ? 0 : way.dwell.value();
                                    }).dwell.value());
   campaign.zero = Seconds(std::max(4.0, campaign.zero.value()));
-  Choice choice = cost_of(question, campaign);
-  predict(question, told, choice);
-  return choice;
+  return predicted(question, told, campaign, campaign.profile);
 }
 
 std::string row_words(const Budget& budget) {
@@ -228,8 +245,8 @@ PlanAnswer answer(const PlanQuestion& question) {
   PlanAnswer result;
   for (const Wish& wish : question.wishes) result.told.push_back(wish.of);
   if (result.told.empty()) result.told = usual_wants(question.campaign);
-  result.as_written = cost_of(question, question.campaign);
-  predict(question, result.told, result.as_written);
+  result.as_written = predicted(question, result.told, question.campaign, question.campaign.profile);
+  add_cost(question, result.as_written);
   if (question.wishes.empty()) return result;
 
   const Choice most = largest(question, result.told);
@@ -239,20 +256,30 @@ PlanAnswer answer(const PlanQuestion& question) {
   if (!result.unreachable.empty()) return result;
 
   const double bend = std::max(kBendToSee, result.as_written.bend_seen);
-  std::set<std::size_t> found;
-  for (const Candidate& candidate : candidates(question)) {
-    if (found.contains(candidate.kind)) continue;
-    Choice choice;
-    choice.campaign = candidate.campaign;
-    predict(question, result.told, choice);
+  const auto sets = occlusion_sets(question.campaign.occlusions_deg);
+  const auto ways = ways_to_step(question);
+  std::set<std::pair<const std::vector<double>*, bool>> found;
+  std::map<std::tuple<const std::vector<double>*, bool, const Steps*, double>, bool> by_repeating;  // fulfilled at all
+  Campaign textless = question.campaign;
+  textless.text.clear();  // not copied for every candidate
+  for (const Candidate& candidate : candidates(question, sets, ways)) {
+    if (found.contains(candidate.kind())) continue;
+    const auto predict = [&](const Candidate& one) {
+      return predicted(question, result.told, one.in(textless), one.steps->expected);
+    };
+    const auto [enough, is_new] = by_repeating.try_emplace(candidate.but_for_repetitions(), true);
+    if (is_new) {
+      Candidate often = candidate;
+      often.repetitions = kMostRepetitions;
+      enough->second = fulfils(question, predict(often), bend);
+    }
+    if (!enough->second) continue;
+    Choice choice = predict(candidate);
     if (!fulfils(question, choice, bend)) continue;
-    const std::vector<Budget> told = std::move(choice.told);
-    const double bend_seen = choice.bend_seen;
-    choice = cost_of(question, candidate.campaign);
-    choice.told = told;
-    choice.bend_seen = bend_seen;
+    choice.campaign.text = question.campaign.text;
+    add_cost(question, choice);
     result.choices.push_back(std::move(choice));
-    found.insert(candidate.kind);
+    found.insert(candidate.kind());
     if (result.choices.size() == kMostChoices) break;
   }
   return result;

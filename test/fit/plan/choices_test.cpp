@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "test/fit/plan/plan_study.hpp"
@@ -109,9 +109,9 @@ TEST(Choices, WithoutAWishTellOfTheCampaignAsItIs) {
 TEST(Choices, AreThereWithinASecond) {
   PlanQuestion asked = question({"slope 0.31 %"});
   asked.campaign.occlusions_deg = {0, 30, 45, 60, 90, 135, 180, 270};
-  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t begin = std::clock();
   (void)answer(asked);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;  // whatever else runs here
   RecordProperty("seconds", fmt::format("{}", seconds));
 #ifdef NDEBUG
   EXPECT_LT(seconds, 1);
