@@ -68,7 +68,7 @@ struct Campaign {
   std::vector<double> occlusions_deg;        ///< degrees in [0, 360), each once, as listed
   int repetitions = 3;                       ///< at least
   std::optional<int> repetitions_most = {};  ///< with profile.until; nullopt: as many as at least
-  int repetitions_extra_max = 1;  ///< more runs of an occlusion whose repetitions disagree; of a range what it leaves
+  int repetitions_extra_max = 1;             ///< more runs of an occlusion, if repetitions disagree or by the range
   Order order;
   StepProfile profile;
   Seconds zero;             ///< motor off, before and after each run
