@@ -126,7 +126,7 @@ TEST_F(Resume, CutsATornLastLineOfTheJournal) {
   EXPECT_EQ(journal().back().event, "campaign_finished");
 }
 
-// Later runs would change what was asked of an occlusion, and its plate is no longer mounted.
+// With the later runs it might ask for another run, though that plate is no longer mounted.
 TEST_F(Resume, DoesNotJudgeAgainTheRepetitionsOfAnOcclusionThatAnotherFollowed) {
   stop_before(180);
   (void)resume();
