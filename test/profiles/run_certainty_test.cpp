@@ -100,5 +100,15 @@ TEST(RunCertainty, CountsAStepThatNeverSettledAsNotHeld) {
   EXPECT_LT(unsettled.enough_n(planned[2], thrust_n(planned[2])), settled.enough_n(planned[2], thrust_n(planned[2])));
 }
 
+// The shortest steps to come will be noisier than a long one was.
+TEST(RunCertainty, ExpectsOfShortStepsTheNoiseOfShortSteps) {
+  const std::vector<PlannedStep> planned = steps(40);
+  RunCertainty brief({kShare, Seconds(kLeast)}, planned), drawn_out = brief;
+  brief.held(planned[0], thrust_n(planned[0]), 0.004, kLeast);
+  drawn_out.held(planned[0], thrust_n(planned[0]), 0.004, 100 * kLeast);
+  EXPECT_FALSE(brief.needs(planned[1]));
+  EXPECT_TRUE(drawn_out.needs(planned[1]));
+}
+
 }  // namespace run_certainty_test
 }  // namespace kphi::profiles

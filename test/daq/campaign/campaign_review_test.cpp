@@ -318,7 +318,13 @@ profiles::Campaign until(std::string text, const std::string& repetitions, const
 }
 
 TEST_F(OrderedCampaign, LeavesOutStepsThatItsKDoesNotNeed) {
+  Position last;
+  said_.at_tick = [&](const Position& position, const Observation&) {
+    if (position.step >= 0) last = position;
+  };
   (void)run(until(campaign("0", 2, "").text, "2", "0.5"));
+  EXPECT_EQ(last.step + 1, 11);
+  EXPECT_EQ(last.steps, 11) << "progress counts no step that is not needed";
   for (const json& accepted : journaled("run_accepted")) {
     EXPECT_EQ(accepted.at("steps_not_needed"), 9) << "every second, but the fastest";
     EXPECT_FALSE(accepted.contains("steps_left_out")) << "all could be reached";
