@@ -45,7 +45,7 @@ struct CheckedFile {
 /// On a bench with the usual rate.
 Plan plan_of(const Campaign& campaign) { return make_plan(campaign, BenchConfig{}); }
 
-std::string summary_of(const Campaign& campaign) {
+std::string lines_of(const Campaign& campaign) {
   std::string doubts;
   if (const auto radians = compensation::doubt_of_angles(campaign.occlusions_deg))
     doubts += "  doubtful   " + *radians + "\n";
@@ -56,7 +56,7 @@ std::string summary_of(const Campaign& campaign) {
                      doubts);
 }
 
-std::string summary_of(const BenchConfig& bench) {
+std::string lines_of(const BenchConfig& bench) {
   const std::string simulated =
       !bench.simulation ? "no"
       : bench.simulation->in_process
@@ -77,7 +77,7 @@ std::string summary_of(const BenchConfig& bench) {
       simulated);
 }
 
-std::string summary_of(const Answers& answers) {
+std::string lines_of(const Answers& answers) {
   std::string mountings;
   for (const auto& [angle, mark] : answers.mountings) mountings += fmt::format(" {:g}", angle);
   return fmt::format("  mountings {}°\n  run again  {} decisions\n", mountings, answers.run_again.size());
@@ -89,7 +89,7 @@ std::string in_words(const Vehicle& vehicle) {
 }
 
 /// A shape with the occlusion of each arm.
-std::string summary_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
+std::string lines_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
                              const compensation::Airframe& airframe) {
   std::string arms, occlusions;
   for (std::size_t i = 0; i < angles.size(); ++i) {
@@ -99,7 +99,7 @@ std::string summary_of_shape(const std::string& name, const std::array<Radians, 
   return fmt::format("  shape {:<4} arms at{}°, occluded by{}°\n", name, arms, occlusions);
 }
 
-std::string summary_of(const flight::Build& build, const flight::Gains& gains) {
+std::string lines_of(const flight::Build& build, const flight::Gains& gains) {
   return fmt::format(
       "  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n"
       "  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
@@ -108,16 +108,16 @@ std::string summary_of(const flight::Build& build, const flight::Gains& gains) {
 }
 
 std::string what_flies(const Vehicle& vehicle) {
-  if (vehicle.dynamics && vehicle.control) return summary_of(*vehicle.dynamics, vehicle.control->gains);
+  if (vehicle.dynamics && vehicle.control) return lines_of(*vehicle.dynamics, vehicle.control->gains);
   return fmt::format("  kphi fly   cannot fly it without {}\n", vehicle.dynamics  ? "control"
                                                                 : vehicle.control ? "dynamics"
                                                                                   : "dynamics and control");
 }
 
-std::string summary_of(const Vehicle& vehicle) {
+std::string lines_of(const Vehicle& vehicle) {
   std::string shapes;
   const compensation::Airframe airframe = airframe_of(vehicle);
-  for (const auto& [name, angles] : vehicle.shapes) shapes += summary_of_shape(name, angles, airframe);
+  for (const auto& [name, angles] : vehicle.shapes) shapes += lines_of_shape(name, angles, airframe);
   return fmt::format(
       "  body       {}, arms {:g} m, propeller radius {:g} m\n"
       "  speeds     {:.6g} to {:.6g} RPM\n"
@@ -126,7 +126,7 @@ std::string summary_of(const Vehicle& vehicle) {
       to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
 }
 
-std::string summary_of(const profiles::World& world) {
+std::string lines_of(const profiles::World& world) {
   const flight::Truth& truth = world.truth;
   return fmt::format(
       "  air        K_T {:.4g} N/RPM2, loss {}, gamma {:g}\n"
@@ -158,7 +158,7 @@ std::string trend_of(const compensation::ThrustCurve& curve) {
                      to_rpm(reference));
 }
 
-std::string summary_of(const compensation::Coefficients& c) {
+std::string lines_of(const compensation::Coefficients& c) {
   std::string doubts;
   for (const std::string& doubt : compensation::doubts_of(c)) doubts += "  doubtful   " + doubt + "\n";
   return fmt::format(
@@ -173,7 +173,7 @@ std::string summary_of(const compensation::Coefficients& c) {
       to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()), trend_of(c.curve), uncertainty_of(c), doubts);
 }
 
-std::string summary_of(const sim::FaultFile& file) {
+std::string lines_of(const sim::FaultFile& file) {
   std::string words;
   for (const sim::Fault& fault : file.faults) {
     words += fmt::format("  at {:g} s  {}", to_seconds(fault.at), sim::name_of(fault.kind));
@@ -184,7 +184,7 @@ std::string summary_of(const sim::FaultFile& file) {
   return words;
 }
 
-std::string summary_of(const sim::MotorParameters& motor) {
+std::string lines_of(const sim::MotorParameters& motor) {
   return fmt::format(
       "  motor      {:.4g} RPM/V, {:g} ohm, {:g} kg m^2 without propeller\n"
       "  supply     {:g} V behind {:g} ohm, at most {:g} A\n",
@@ -209,24 +209,24 @@ const std::vector<Kind>& kinds() {
   using File = CheckedFile&;
   static const std::vector<Kind> all{
       ours(FileKind::campaign,
-           [](Text text, File file) { return summary_of(file.campaign.emplace(parse_campaign(text, file.path))); },
+           [](Text text, File file) { return lines_of(file.campaign.emplace(parse_campaign(text, file.path))); },
            {"occlusions_deg", "profile"}),
       ours(FileKind::bench,
-           [](Text text, File file) { return summary_of(file.bench.emplace(parse_bench(text, file.path))); },
+           [](Text text, File file) { return lines_of(file.bench.emplace(parse_bench(text, file.path))); },
            {"netbox", "iq"}),
-      ours(FileKind::vehicle, [](Text text, File file) { return summary_of(parse_vehicle(text, file.path)); },
+      ours(FileKind::vehicle, [](Text text, File file) { return lines_of(parse_vehicle(text, file.path)); },
            {"shapes_deg", "half_side_m"}),
       ours(FileKind::answers,
-           [](Text text, File file) { return summary_of(file.answers.emplace(parse_answers(text, file.path))); },
+           [](Text text, File file) { return lines_of(file.answers.emplace(parse_answers(text, file.path))); },
            {"mountings"}),
-      ours(FileKind::world, [](Text text, File file) { return summary_of(profiles::parse_world(text, file.path)); },
+      ours(FileKind::world, [](Text text, File file) { return lines_of(profiles::parse_world(text, file.path)); },
            {"k_t_n_per_rpm2", "loss_law"}),
       {"coefficients", compensation::kCoefficientFormat,
-       [](Text, File file) { return summary_of(load_sealed_coefficients(file.path)); }},
+       [](Text, File file) { return lines_of(load_sealed_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",
-       [](Text text, File file) { return summary_of(sim::parse_faults(text, file.path)); }},
+       [](Text text, File file) { return lines_of(sim::parse_faults(text, file.path)); }},
       {"simulated motor", "kphi-sim-motor/1",
-       [](Text text, File file) { return summary_of(sim::parse_motor_profile(text, file.path).motor); }},
+       [](Text text, File file) { return lines_of(sim::parse_motor_profile(text, file.path).motor); }},
   };
   return all;
 }

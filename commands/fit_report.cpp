@@ -208,7 +208,7 @@ double expanded(const Estimate& estimate) {
   return std::isnan(estimate.u) ? estimate.u : coverage_factor(estimate.freedom) * estimate.u;
 }
 
-std::string words_of(const char* name, const Estimate& estimate, const char* per) {
+std::string text_of(const char* name, const Estimate& estimate, const char* per) {
   return fmt::format("{:<10} {} N/(rad/s)^2{}\n", name, with_error(estimate.value, expanded(estimate)), per);
 }
 
@@ -237,7 +237,7 @@ ExitCode run_table_line(const FitRequest& request, const FitInput& input, const 
                 {"scatter", line.scatter}});
   } else {
     fmt::print("{:<10} {}\n{:<10} the table cannot fly: {}\n{}{}", "verdict", verdict, "", obstacle,
-               words_of("intercept", line.intercept, ""), words_of("slope", line.slope_per_deg, "/deg"));
+               text_of("intercept", line.intercept, ""), text_of("slope", line.slope_per_deg, "/deg"));
     fmt::print("± is 95 % by the scatter of {} points about the line{}\n", line.points,
                line.weighted ? ", weighted by their u" : "; no u of k was given");
   }

@@ -70,7 +70,7 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
 
 using Lines = std::vector<std::pair<std::size_t, std::string>>;  // with their numbers
 
-Lines lines_of(const std::string& text, const std::string& opening) {
+Lines split_lines(const std::string& text, const std::string& opening) {
   Lines lines;
   std::istringstream in(text);
   std::string line;
@@ -83,7 +83,7 @@ Lines lines_of(const std::string& text, const std::string& opening) {
 std::optional<std::string> difference(const std::string& again, const std::string& stored,
                                       const std::string& opening = {}) {
   if (again == stored) return std::nullopt;
-  const Lines was = lines_of(stored, opening), is = lines_of(again, opening);
+  const Lines was = split_lines(stored, opening), is = split_lines(again, opening);
   for (std::size_t i = 0; i < std::max(was.size(), is.size()); ++i) {
     const auto [number, before] =
         i < was.size() ? was[i] : std::pair(was.empty() ? 1 : was.back().first + 1, "(no line)");

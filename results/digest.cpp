@@ -7,18 +7,19 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <new>
 #include <vector>
 
 #include "base/error.hpp"
 #include "base/ordered_work.hpp"
 #include "results/file_layer.hpp"
 
-#define XXH_INLINE_ALL  // no library to link
 #include <xxhash.h>
+#ifdef __x86_64__
+#include <xxh_x86dispatch.h>  // XXH3 in the widest registers of the processor it runs on
+#endif
 
 namespace kphi::results {
-
-void update_by_avx2(XXH3_state_t* state, const void* bytes, std::size_t n);  // xxh3_avx2.cpp, on x86_64 only
 
 namespace {
 
@@ -28,15 +29,6 @@ void start_openssl() {
                                                      OPENSSL_INIT_NO_ADD_ALL_CIPHERS | OPENSSL_INIT_NO_ADD_ALL_DIGESTS,
                                                  nullptr);
   (void)started;
-}
-
-using Update = void (*)(XXH3_state_t*, const void*, std::size_t);
-
-Update quickest_update() {
-#ifdef __x86_64__
-  if (__builtin_cpu_supports("avx2")) return &update_by_avx2;
-#endif
-  return [](XXH3_state_t* state, const void* bytes, std::size_t n) { XXH3_128bits_update(state, bytes, n); };
 }
 
 void check(bool ok) {
@@ -77,23 +69,15 @@ std::string sha256_of_file(const std::filesystem::path& path) {
   return digest.hex();
 }
 
-struct Xxh128::State {
-  XXH3_state_t of;
-};
-
-Xxh128::Xxh128() : state_(std::make_unique<State>()) { XXH3_128bits_reset(&state_->of); }
-
-Xxh128::Xxh128(Xxh128&&) noexcept = default;
-
-Xxh128::~Xxh128() = default;
-
-void Xxh128::update(std::string_view bytes) {
-  static const auto quickest = quickest_update();
-  quickest(&state_->of, bytes.data(), bytes.size());
+Xxh128::Xxh128() : state_(XXH3_createState(), [](XXH3_state_s* state) { XXH3_freeState(state); }) {
+  if (!state_) throw std::bad_alloc();
+  XXH3_128bits_reset(state_.get());
 }
 
+void Xxh128::update(std::string_view bytes) { XXH3_128bits_update(state_.get(), bytes.data(), bytes.size()); }
+
 std::string Xxh128::hex() const {
-  const XXH128_hash_t hash = XXH3_128bits_digest(&state_->of);
+  const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 

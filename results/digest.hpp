@@ -13,6 +13,7 @@
 #include "base/text.hpp"
 
 struct evp_md_ctx_st;
+struct XXH3_state_s;
 
 namespace kphi::results {
 
@@ -35,15 +36,12 @@ class Sha256 {
 class Xxh128 {
  public:
   Xxh128();
-  Xxh128(Xxh128&&) noexcept;
-  ~Xxh128();
   void update(std::string_view bytes);
   /// Of the bytes so far: 32 lower-case hex digits, as xxh128sum prints them.
   [[nodiscard]] std::string hex() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<XXH3_state_s, void (*)(XXH3_state_s*)> state_;
 };
 
 [[nodiscard]] std::string xxh128(std::string_view bytes);

@@ -1,7 +1,6 @@
 #include "compensation/flight/reproduction.hpp"
 
 #include <cmath>
-#include <cstdio>
 #include <functional>
 
 #include "compensation/flight/tables.hpp"
@@ -74,13 +73,6 @@ Reproduced judged(const PaperCell& cell, bool is_error) {
   const double low = cell.spread.p10, high = cell.spread.p90;
   if (cell.paper >= low && cell.paper <= high) return Reproduced::within;
   return is_error && high < cell.paper ? Reproduced::better : Reproduced::not_reproduced;
-}
-
-template <class... Values>
-std::string words(const char* format, Values... values) {
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
 }
 
 std::string number(const std::optional<double>& value) { return value ? words("%9.4f", *value) : "     lost"; }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,6 +12,14 @@
 #include "compensation/flight/study.hpp"
 
 namespace kphi::flight {
+
+/// As printf prints it, cut to 399 characters.
+template <class... Values>
+std::string words(const char* format, Values... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
 
 /// Table I: absolute position errors in the final configuration [m].
 struct HoverRow {

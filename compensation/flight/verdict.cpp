@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string_view>
+
+#include "compensation/flight/tables.hpp"
 
 namespace kphi::flight {
 namespace {
@@ -11,13 +12,6 @@ namespace {
 const Percentiles& merit(const Findings& findings, std::string_view key) {
   const auto found = std::find_if(kMerits.begin(), kMerits.end(), [&](const Merit& one) { return one.key == key; });
   return findings.merits[static_cast<std::size_t>(found - kMerits.begin())];
-}
-
-template <class... Values>
-std::string words(const char* format, Values... values) {
-  char text[400];
-  std::snprintf(text, sizeof text, format, values...);
-  return text;
 }
 
 /// "in 12 of 400 draws", or of one set of circumstances.

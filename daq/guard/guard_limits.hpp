@@ -198,7 +198,7 @@ struct DeviceLimits {
 
 inline constexpr double kRangeBorne = 1.1;  ///< share of a range of the load cell: beyond it the cell is in danger
 /// A sanitizer makes a live bench many times slower; a bench in process has virtual time.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef KPHI_SANITIZED
 inline constexpr bool kInstrumented = true;
 #else
 inline constexpr bool kInstrumented = false;

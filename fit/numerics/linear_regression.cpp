@@ -9,7 +9,6 @@ namespace kphi::fit {
 namespace {
 
 using Long = long double;
-__extension__ using Quad = __float128;
 using Matrix = Eigen::Matrix<Long, Eigen::Dynamic, Eigen::Dynamic>;
 using Vector = Eigen::Matrix<Long, Eigen::Dynamic, 1>;
 
@@ -26,11 +25,17 @@ Vector equilibrate(Matrix& design) {
   return lengths;
 }
 
-/// Σ a b with 113 bits.
+/// Σ a b as if summed in twice the digits (Ogita, Rump, Oishi, "Accurate sum and dot product", 2005, algorithm Dot2).
 Long accurate_dot(const Vector& a, const Vector& b) {
-  Quad sum = 0;
-  for (Eigen::Index i = 0; i < a.size(); ++i) sum += static_cast<Quad>(a[i]) * static_cast<Quad>(b[i]);
-  return static_cast<Long>(sum);
+  Long sum = 0, errors = 0;
+  for (Eigen::Index i = 0; i < a.size(); ++i) {
+    const Long product = a[i] * b[i];
+    const Long next = sum + product;
+    const Long taken = next - sum;
+    errors += std::fma(a[i], b[i], -product) + ((sum - (next - taken)) + (product - taken));
+    sum = next;
+  }
+  return sum + errors;
 }
 
 /// Where residuals are large, least squares lose twice as many digits as an equation would. Xᵀr shows how far the

@@ -186,7 +186,7 @@ std::string occlusion_words(const Campaign& campaign) {
   return fmt::format("{:g}", fmt::join(campaign.occlusions_deg, " "));
 }
 
-std::string percent(double share) { return std::isfinite(share) ? in_percent(share) + " %" : "none"; }
+std::string share_words(double share) { return std::isfinite(share) ? in_percent(share) + " %" : "none"; }
 
 /// Of all choices, so that a table is as wide as it must be.
 std::size_t widest_occlusions(const PlanAnswer& answer) {
@@ -203,8 +203,8 @@ std::string choice_line(const std::string& name, const Choice& choice, std::size
                   choice.mountings, choice.runs, 1e-9 * static_cast<double>(choice.bytes), one.repetitions,
                   occlusion_words(one), occlusions_width, fmt::format("{}{}", most, one.profile.steps),
                   fmt::format("{}{:g} s", most, one.profile.dwell.value()), fmt::format("{:g} s", one.zero.value()));
-  for (const Budget& budget : choice.told) line += fmt::format(" {:>9}", percent(share_of(budget)));
-  return line + fmt::format(" {:>7}\n", percent(choice.bend_seen));
+  for (const Budget& budget : choice.told) line += fmt::format(" {:>9}", share_words(share_of(budget)));
+  return line + fmt::format(" {:>7}\n", share_words(choice.bend_seen));
 }
 
 Json to_json(const Choice& choice) {
@@ -307,7 +307,7 @@ std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) 
   if (!unknown.empty()) text += fmt::format("unknown and not in it: {} (see --u)\n", fmt::join(unknown, ", "));
   for (const Unreachable& one : answer.unreachable)
     text += fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n",
-                        one.wish.of.name(), percent(one.wish.share), percent(one.best), kMostRepetitions, one.because);
+                        one.wish.of.name(), share_words(one.wish.share), share_words(one.best), kMostRepetitions, one.because);
   return text;
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/csv.hpp"
 #include "base/error.hpp"
+#include "base/statistics.hpp"
 #include "fit/plan/memory.hpp"
 #include "fit/plan/run_differences.hpp"
 #include "results/reduction/run_scatter.hpp"
@@ -118,12 +119,7 @@ struct Samples {
   }
 };
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
+double median_or_zero(std::vector<double> values) { return values.empty() ? 0 : upper_median(std::move(values)); }
 
 /// `moved_n`: how far the zero wanders in a run; 0 while that is not known yet.
 void take_steps(const Fitted& fitted, double moved_n, StandNoise& noise) {
@@ -229,7 +225,7 @@ StandNoise noise_of(const PilotCampaign& pilot) {
   std::vector<double> model;
   for (std::size_t i = 0; i < analysis.speed.size(); ++i)
     model.push_back(analysis.speed[i].inadequacy / std::abs(identification.table[i].k));
-  noise.model = median(std::move(model));
+  noise.model = median_or_zero(std::move(model));
   noise.K_T = identification.thrust_coefficient().value;
   if (identification.alone()) return noise;
   const CurveFit line = fit_curve(points_of(identification.table), {});
@@ -240,13 +236,13 @@ StandNoise noise_of(const PilotCampaign& pilot) {
   return noise;
 }
 
-double rms(std::span<const StandNoise> all, double StandNoise::*member) {
+double rms_of_stands(std::span<const StandNoise> all, double StandNoise::*member) {
   double squares = 0;
   for (const StandNoise& one : all) squares += one.*member * one.*member / static_cast<double>(all.size());
   return std::sqrt(squares);
 }
 
-double mean(std::span<const StandNoise> all, double StandNoise::*member) {
+double mean_of_stands(std::span<const StandNoise> all, double StandNoise::*member) {
   double sum = 0;
   for (const StandNoise& one : all) sum += one.*member / static_cast<double>(all.size());
   return sum;
@@ -293,15 +289,15 @@ StandNoise noise_of(std::span<const PilotCampaign> pilots) {
   StandNoise noise = all.front();
   for (double StandNoise::*member : {&StandNoise::noise_n, &StandNoise::noise_share, &StandNoise::slow_n,
                                      &StandNoise::slow_share, &StandNoise::zero_n, &StandNoise::zero_walk_n})
-    noise.*member = rms(all, member);
+    noise.*member = rms_of_stands(all, member);
   for (double StandNoise::*member : {&StandNoise::model, &StandNoise::bend}) {
     std::vector<double> values;
     for (const StandNoise& one : all) values.push_back(one.*member);
-    noise.*member = median(std::move(values));
+    noise.*member = median_or_zero(std::move(values));
   }
   for (double StandNoise::*member : {&StandNoise::memory_s, &StandNoise::slow_memory_s, &StandNoise::settle_s,
                                      &StandNoise::K_T, &StandNoise::intercept, &StandNoise::slope_per_deg})
-    noise.*member = mean(all, member);
+    noise.*member = mean_of_stands(all, member);
   take_runs(pilots, noise);
   return noise;
 }

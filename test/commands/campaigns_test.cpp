@@ -42,7 +42,7 @@ class Campaigns : public testing::Test {
     std::string out, err;
   };
   static Answer say(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), KPHI_PROGRAM);
+    arguments.insert(arguments.begin(), test::kphi());
     Process process(arguments);
     const int code = process.wait();
     return {code, process.out(), process.err()};

@@ -31,7 +31,7 @@ class FirstSteps : public testing::Test {
   };
   /// In a folder of its own, as a person types it.
   Answer say(const std::string& line) {
-    Process process({"/bin/sh", "-c", "cd '" + folder_.path().string() + "' && " KPHI_PROGRAM " " + line});
+    Process process({"/bin/sh", "-c", "cd '" + folder_.path().string() + "' && " + test::kphi() + " " + line});
     const int code = process.wait();
     return {code, process.out(), process.err()};
   }

@@ -6,7 +6,7 @@
 
 namespace kphi::test {
 
-#if defined(__x86_64__) && defined(__linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if defined(__x86_64__) && defined(__linux__) && !defined(KPHI_SANITIZED)
 inline constexpr bool kInstructionsCanBeCounted = true;
 // Below the stack's red zone, which the caller may be using.
 #define KPHI_TRAP_FLAG(change)                                                                              \

@@ -214,7 +214,7 @@ void check(const Case& of, Tally& tally) {
   }
 }
 
-#if defined(__SANITIZE_ADDRESS__)
+#ifdef KPHI_SANITIZED
 constexpr int kCases = 2'000;  // ten times as slow
 #else
 constexpr int kCases = 25'000;

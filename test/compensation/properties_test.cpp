@@ -12,7 +12,7 @@
 namespace kphi::compensation {
 namespace properties_test {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef KPHI_SANITIZED
 constexpr int kDraws = 50000;
 #else
 constexpr int kDraws = 1000000;

@@ -103,6 +103,7 @@ TEST_P(KilledCampaign, ResumedEachTimeGivesTheRunsTheTablesAndTheFitOfOneThatWas
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kills, KilledCampaign, testing::Values(KPHI_KILLS));
+INSTANTIATE_TEST_SUITE_P(Few, KilledCampaign, testing::Values(20));
+INSTANTIATE_TEST_SUITE_P(Many, KilledCampaign, testing::Values(200));
 
 }  // namespace kphi::test::killed_campaign_test

@@ -21,7 +21,7 @@ class MountError : public std::runtime_error {
 };
 
 inline constexpr std::uint64_t kImageBytes = 320u << 20;  // XFS makes none that is smaller than 300 MB; sparse
-inline constexpr auto kPatience = std::chrono::seconds(30);
+inline constexpr auto kImagePatience = std::chrono::seconds(30);
 
 inline std::string cause() { return std::generic_category().message(errno); }
 
@@ -71,7 +71,7 @@ class MountedImage {
   /// What the device holds at one moment, as a power cut would leave it: all that was written to it and nothing of what
   /// the kernel still keeps in memory. A copy during which the device was written to is made again.
   void cut_power(const std::filesystem::path& copy) const {
-    const auto give_up = std::chrono::steady_clock::now() + kPatience;
+    const auto give_up = std::chrono::steady_clock::now() + kImagePatience;
     while (std::chrono::steady_clock::now() < give_up) {
       const Traffic before = traffic();
       if (before.in_flight > 0) {

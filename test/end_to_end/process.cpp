@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -50,6 +51,10 @@ bool may_set_real_time() {
 }
 
 }  // namespace
+
+std::string kphi() { return kphi_is_of_another_build() ? std::getenv("KPHI_PROGRAM") : KPHI_PROGRAM; }
+
+bool kphi_is_of_another_build() { return std::getenv("KPHI_PROGRAM") != nullptr; }
 
 std::vector<std::string> in_real_time(std::vector<std::string> command, int priority) {
   static const bool may = may_set_real_time();

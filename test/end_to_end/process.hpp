@@ -14,6 +14,10 @@ struct Surroundings {
   int fifo_priority = 0;  ///< of SCHED_FIFO; 0: none. A child that is refused it goes on without: see is_real_time()
 };
 
+/// The program under test: that of this build, or what KPHI_PROGRAM names, such as a sanitizer's.
+[[nodiscard]] std::string kphi();
+[[nodiscard]] bool kphi_is_of_another_build();
+
 class Process {
  public:
   /// Starts `arguments[0]`; standard input is `input`, then closed.

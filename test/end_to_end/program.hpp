@@ -17,8 +17,6 @@
 
 namespace kphi::test {
 
-inline std::string kphi() { return KPHI_PROGRAM; }
-
 inline void write(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
 
 /// The words of a program that has ended.

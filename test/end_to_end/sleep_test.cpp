@@ -126,10 +126,7 @@ TEST_P(SleepingComputer, TellsNoMotorToTurnWhenItWakes) {
 
 std::string name_in_suite(const testing::TestParamInfo<Row>& row) { return name_of(row.param); }
 
-#ifdef KPHI_NIGHT
 INSTANTIATE_TEST_SUITE_P(ByNight, SleepingComputer, testing::ValuesIn(rows(true)), name_in_suite);
-#else
 INSTANTIATE_TEST_SUITE_P(ByDay, SleepingComputer, testing::ValuesIn(rows(false)), name_in_suite);
-#endif
 
 }  // namespace kphi::test::sleep_test

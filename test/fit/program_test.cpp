@@ -32,13 +32,13 @@ struct Answer {
 };
 
 Answer kphi(std::vector<std::string> arguments, const std::string& input = {}) {
-  arguments.insert(arguments.begin(), KPHI_PROGRAM);
+  arguments.insert(arguments.begin(), test::kphi());
   Process process(arguments, input);
   const int code = process.wait();
   return {code, process.out(), process.err()};
 }
 
-class Program : public ::testing::Test {
+class FitProgram : public ::testing::Test {
  protected:
   /// A folder with the steps of one simulated campaign.
   std::string steps(const std::string& name, unsigned seed = 1, double inches = 5, int blades = 3, double factor = 1) {
@@ -68,7 +68,7 @@ class Program : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Program, DrawsTheReportOfTheFitAgainByteForByte) {
+TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
   const std::string config = steps("5x3");
   const std::vector<std::vector<std::string>> ways{
       {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
@@ -84,7 +84,7 @@ TEST_F(Program, DrawsTheReportOfTheFitAgainByteForByte) {
   }
 }
 
-TEST_F(Program, HandsTheOverlapMeasureToWhoFlies) {
+TEST_F(FitProgram, HandsTheOverlapMeasureToWhoFlies) {
   const std::string config = steps("5x3");
   const std::string vehicle = test::source_dir() + "/profiles/foldable_drone.yaml";
   const std::string row =
@@ -101,7 +101,7 @@ TEST_F(Program, HandsTheOverlapMeasureToWhoFlies) {
   expect_refused({"fit", config, "--overlap", "rim"}, 2, "rim_arc");
 }
 
-TEST_F(Program, ComparesAFamilyFromItsFolders) {
+TEST_F(FitProgram, ComparesAFamilyFromItsFolders) {
   const std::vector<std::string> places{steps("5x2", 1, 5, 2, 0.76), steps("5x3", 2), steps("6x2", 3, 6, 2, 1.55),
                                         steps("6x3", 4, 6, 3, 1.85)};
   for (const auto& config : places) ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
@@ -120,7 +120,7 @@ TEST_F(Program, ComparesAFamilyFromItsFolders) {
   expect_refused({"compare", places[0]}, 2, "RESULT");
 }
 
-TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
+TEST_F(FitProgram, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   const std::string empty = (folder_ / "empty").string();
   std::filesystem::create_directories(empty);
   const std::string config = steps("5x3");
@@ -148,7 +148,7 @@ TEST_F(Program, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   EXPECT_FALSE(std::filesystem::exists(config + "/coefficients.yaml")) << "what is refused leaves nothing behind";
 }
 
-TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
+TEST_F(FitProgram, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   const std::string config = steps("5x3");
   expect_refused({"report", config}, 2, "kphi fit " + config);
   expect_refused({"compare", config, config}, 2, "not fitted yet; run `kphi fit");
@@ -163,13 +163,13 @@ TEST_F(Program, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   expect_refused({"import", folder_.path().string(), "--out", (folder_ / "tables").string()}, 2, "");
 }
 
-TEST_F(Program, TakesOneValueForEachOptionThatMayBeRepeated) {
+TEST_F(FitProgram, TakesOneValueForEachOptionThatMayBeRepeated) {
   const std::string config = steps("5x3");
   EXPECT_EQ(kphi({"fit", "--no-report", "--u", "clock=1e-5", "--leave-out", "90:2:plate slipped", config}).code, 0)
       << "the folder is no second value";
 }
 
-TEST_F(Program, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
+TEST_F(FitProgram, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
   const std::string folder = steps("5x3");
   auto exchanged = results::read_steps(folder + "/steps.csv");
   for (auto& step : exchanged)
@@ -182,7 +182,7 @@ TEST_F(Program, ExitsWithFiveForAResultThatMustNotFlyUnlessItIsAccepted) {
   EXPECT_EQ(kphi({"fit", folder, "--no-report", "--accept"}).code, 0);
 }
 
-TEST_F(Program, FliesTheTableWhereKOverPhiIsNoLine) {
+TEST_F(FitProgram, FliesTheTableWhereKOverPhiIsNoLine) {
   const std::string folder = (folder_ / "bent").string();
   std::filesystem::create_directories(folder);
   results::write_steps(folder + "/steps.csv", study_campaign({.bend = -0.2}, 1).steps);
@@ -216,7 +216,7 @@ TEST_F(Program, FliesTheTableWhereKOverPhiIsNoLine) {
   EXPECT_THAT(two.err, HasSubstr("names 2 files, but the vehicle has 4 rotors"));
 }
 
-TEST_F(Program, FitsALogWithoutOcclusionsToKTAlone) {
+TEST_F(FitProgram, FitsALogWithoutOcclusionsToKTAlone) {
   const std::string folder = steps("5x3");
   auto log = results::read_steps(folder + "/steps.csv");
   std::erase_if(log, [](const auto& step) { return step.occlusion_deg != 0; });
@@ -238,7 +238,7 @@ TEST_F(Program, FitsALogWithoutOcclusionsToKTAlone) {
   expect_refused({"export", folder, "--to", "px4"}, 2, "not fitted yet");
 }
 
-TEST_F(Program, TellsAllItFoundAsJson) {
+TEST_F(FitProgram, TellsAllItFoundAsJson) {
   const Answer fit = kphi({"fit", steps("5x3"), "--no-report", "--json"});
   ASSERT_EQ(fit.code, 0);
   const json found = json::parse(fit.out);
@@ -247,7 +247,7 @@ TEST_F(Program, TellsAllItFoundAsJson) {
   EXPECT_TRUE(found.at("analysis").at("outlying_runs").is_array());
 }
 
-TEST_F(Program, ExplainsEveryCommand) {
+TEST_F(FitProgram, ExplainsEveryCommand) {
   for (const char* command : {"fit", "report", "compare", "export", "import"}) {
     const Answer help = kphi({command, "--help"});
     EXPECT_EQ(help.code, 0);
@@ -279,7 +279,7 @@ NistTable nist(const std::string& name) {
   return table;
 }
 
-TEST_F(Program, FitsTheLinesThatNistCertified) {
+TEST_F(FitProgram, FitsTheLinesThatNistCertified) {
   for (const char* name : {"Norris", "NoInt1", "NoInt2"}) {
     const NistTable problem = nist(name);
     std::vector<std::string> fit{"fit", file(std::string(name) + ".csv", problem.text), "--json", "--no-report"};
@@ -300,7 +300,7 @@ TEST_F(Program, FitsTheLinesThatNistCertified) {
   }
 }
 
-TEST_F(Program, FitsATableThatCannotFlyAsFarAsItGoes) {
+TEST_F(FitProgram, FitsATableThatCannotFlyAsFarAsItGoes) {
   const Answer twice =
       kphi({"fit", file("twice.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n90,1.2e-6\n90,1.1e-6\n180,8e-7\n")});
   EXPECT_EQ(twice.code, 5);

@@ -12,7 +12,7 @@ namespace {
 constexpr double kIntegralMax = 3.0;        // V
 constexpr double kBusCapacitance = 270e-6;  // F: the capacitor that the vendor supplies
 constexpr double kApproach = 0.5;           // of the way to the voltage limit, per tick
-constexpr double kSaturated = 1e-3;         // V
+constexpr double kShortOfVoltage = 1e-3;         // V
 
 /// A current at which regeneration lifts the bus no further than it may within one tick; the firmware's own tick is
 /// much shorter, so it can wait and see. `emf` and the result are of the turning direction.
@@ -119,7 +119,7 @@ double IqControl::limited(double volts, const IqLimits& limits, const IqSensed& 
 void IqControl::integrate(const MotorDrive& drive, double demanded, double given) noexcept {
   if (drive.mode != MotorDrive::Mode::velocity) return;
   const double short_by = demanded - given;
-  if (std::abs(short_by) > kSaturated && short_by * error_ > 0) return;
+  if (std::abs(short_by) > kShortOfVoltage && short_by * error_ > 0) return;
   integral_ = std::clamp(integral_ + drive.ki * error_ * kTick, -kIntegralMax, kIntegralMax);
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kBitsPerByte = 10;       // 8N1
 constexpr double kRateTolerance = 0.045;  // beyond it the stop bit is missed
-constexpr std::uint8_t kReply = 3;
+constexpr std::uint8_t kReplyCode = 3;
 constexpr std::array<std::uint32_t, 3> kOtherUid{0x00410018, 0x4d4b5022, 0x20343354};
 
 /// Faults of a moment or a span; all others of the motor wait for replies or bytes.
@@ -172,7 +172,7 @@ void IqLine::put(const FaultDecision& decision, std::size_t entry) {
   Passage passage = decision.passage;
   passage.entry = entry;
   append_iq_frame(passage.bytes, decision.reply.type, decision.reply.sub,
-                  static_cast<std::uint8_t>(decision.reply.id << 2 | kReply), decision.reply.data());
+                  static_cast<std::uint8_t>(decision.reply.id << 2 | kReplyCode), decision.reply.data());
   const std::vector<std::uint8_t> intact = passage.bytes;
   if (decision.bad_crc) passage.bytes.back() ^= 0x5a;
   for (std::uint64_t i = 0; i < decision.flips; ++i) {

@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 constexpr std::uint8_t kId = 0xD0, kReset = 0xE0, kControlHumidity = 0xF2, kStatus = 0xF3, kControlMeasure = 0xF4,
                        kConfig = 0xF5, kPressure = 0xF7, kTemperature = 0xFA, kHumidity = 0xFD;
 constexpr Duration kLoading = 2ms;
-constexpr double kMany = 1048575, kManyHumid = 65535;  // largest counts
+constexpr double kLargestCount = 1048575, kLargestHumidCount = 65535;  // largest counts
 
 /// Times that a channel is sampled, by its oversampling code; 0: skipped.
 int samples_of(int code) noexcept { return code == 0 ? 0 : 1 << std::min(code - 1, 4); }
@@ -27,7 +27,7 @@ double counts(double value, double most) noexcept { return std::clamp(std::round
 
 double temperature_counts(double celsius, const Bme280Constants& c) noexcept {
   const double x = small_root(c.t3 / 64.0, c.t2, celsius * 5120);
-  return counts((x + c.t1 / 1024.0) * 16384, kMany);
+  return counts((x + c.t1 / 1024.0) * 16384, kLargestCount);
 }
 
 /// What the temperature's counts tell the other two channels.
@@ -42,14 +42,14 @@ double pressure_counts(double pascal, double fine, const Bme280Constants& c) noe
   const double offset = (v * v * p(6) / 32768 + v * p(5) * 2) / 4 + p(4) * 65536;
   const double scale = (1 + (p(3) * v * v / 524288 + p(2) * v) / 524288 / 32768) * p(1);
   const double linear = small_root(p(9) / 34359738368.0, 1 + p(8) / 524288, pascal - p(7) / 16);
-  return counts(1048576 - (linear * scale / 6250 + offset / 4096), kMany);
+  return counts(1048576 - (linear * scale / 6250 + offset / 4096), kLargestCount);
 }
 
 double humidity_counts(double percent, double fine, const Bme280Constants& c) noexcept {
   const double v = fine - 76800;
   const double gain = c.h2 / 65536.0 * (1 + c.h6 / 67108864.0 * v * (1 + c.h3 / 67108864.0 * v));
   const double bent = small_root(-c.h1 / 524288.0, 1, percent);
-  return counts(bent / gain + c.h4 * 64 + c.h5 / 16384.0 * v, kManyHumid);
+  return counts(bent / gain + c.h4 * 64 + c.h5 / 16384.0 * v, kLargestHumidCount);
 }
 
 /// Vapour pressure of saturated air, any unit (Magnus).

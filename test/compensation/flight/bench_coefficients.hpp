@@ -13,10 +13,10 @@ namespace kphi::test {
 /// The coefficients.yaml of `campaign` (a file) on `bench`, written below `folder`.
 inline std::string bench_coefficients(const std::string& campaign, const std::string& bench,
                                       const TemporaryFolder& folder) {
-  Process run({KPHI_PROGRAM, "run", campaign, "--bench", bench, "--yes", "--out", (folder / "campaign").string()});
+  Process run({test::kphi(), "run", campaign, "--bench", bench, "--yes", "--out", (folder / "campaign").string()});
   EXPECT_EQ(run.wait(std::chrono::seconds(600)), 0) << run.err();
   const std::string results = run.out().substr(0, run.out().find('\n'));
-  Process fit({KPHI_PROGRAM, "fit", results});
+  Process fit({test::kphi(), "fit", results});
   EXPECT_EQ(fit.wait(std::chrono::seconds(120)), 0) << fit.err();
   return results + "/coefficients.yaml";
 }

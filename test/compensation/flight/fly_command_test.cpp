@@ -44,7 +44,7 @@ class Fly : public testing::Test {
   };
   static Outcome fly(const std::vector<std::string>& more, const std::string& coefficients = coefficients_,
                      const std::string& vehicle = kVehicle) {
-    std::vector<std::string> arguments{KPHI_PROGRAM, "fly", "--coefficients", coefficients, "--vehicle", vehicle};
+    std::vector<std::string> arguments{test::kphi(), "fly", "--coefficients", coefficients, "--vehicle", vehicle};
     arguments.insert(arguments.end(), more.begin(), more.end());
     Process process(arguments);
     const int code = process.wait();

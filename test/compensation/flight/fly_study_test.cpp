@@ -15,7 +15,7 @@ TEST(FlyStudy, OfFourHundredDrawsFindsWhatThePaperFound) {
   const TemporaryFolder folder;
   const std::string coefficients =
       bench_coefficients(kProfiles + "icra2021_5in_3blade.yaml", kProfiles + "bench_deterministic.yaml", folder);
-  Process fly({KPHI_PROGRAM, "fly", "--coefficients", coefficients, "--vehicle", kProfiles + "foldable_drone.yaml",
+  Process fly({test::kphi(), "fly", "--coefficients", coefficients, "--vehicle", kProfiles + "foldable_drone.yaml",
                "--draws", "400", "--seed", "1", "--json"});
   ASSERT_EQ(fly.wait(std::chrono::seconds(600)), 0) << fly.err();
   const auto study = nlohmann::json::parse(fly.out())["study"];

@@ -11,7 +11,7 @@ namespace verdict_test {
 using testing::HasSubstr;
 using testing::SizeIs;
 
-#if defined(__SANITIZE_ADDRESS__)
+#ifdef KPHI_SANITIZED
 constexpr std::size_t kDraws = 9;  // ten times as slow
 #else
 constexpr std::size_t kDraws = 24;

@@ -26,7 +26,7 @@ struct Mode {
 
 void PrintTo(const Mode& mode, std::ostream* out) { *out << mode.name; }
 
-class EachFault : public testing::TestWithParam<Mode> {
+class EachMotorFault : public testing::TestWithParam<Mode> {
  protected:
   Joined& join(sim::FaultScript faults, Instant end) {
     joined.emplace(manner, std::move(faults), 42);
@@ -63,7 +63,7 @@ class EachFault : public testing::TestWithParam<Mode> {
   std::optional<Joined> joined;
 };
 
-TEST_P(EachFault, NoneAtAll) {
+TEST_P(EachMotorFault, NoneAtAll) {
   Joined& j = run({});
   EXPECT_EQ(j.failures(), 0);
   EXPECT_EQ(lost(j), 0u);
@@ -74,26 +74,26 @@ TEST_P(EachFault, NoneAtAll) {
   EXPECT_TRUE(j.session().coasting());
 }
 
-TEST_P(EachFault, FlippedBits) { EXPECT_GT(run_one({{"kind", "motor_flip"}, {"bits", "3"}}).counters().timeouts, 0u); }
+TEST_P(EachMotorFault, FlippedBits) { EXPECT_GT(run_one({{"kind", "motor_flip"}, {"bits", "3"}}).counters().timeouts, 0u); }
 
-TEST_P(EachFault, BadChecksums) {
+TEST_P(EachMotorFault, BadChecksums) {
   const Counters& c = run_one({{"kind", "motor_bad_crc"}}).counters();
   EXPECT_GE(c.crc_errors, done(sim::FaultKind::motor_bad_crc));
   EXPECT_EQ(lost(*joined), done(sim::FaultKind::motor_bad_crc));
 }
 
-TEST_P(EachFault, DroppedReplies) {
+TEST_P(EachMotorFault, DroppedReplies) {
   run_one({{"kind", "motor_drop"}});
   EXPECT_EQ(lost(*joined), done(sim::FaultKind::motor_drop));
 }
 
-TEST_P(EachFault, DuplicatedReplies) {
+TEST_P(EachMotorFault, DuplicatedReplies) {
   const Counters& c = run_one({{"kind", "motor_duplicate"}}).counters();
   EXPECT_EQ(c.unasked, done(sim::FaultKind::motor_duplicate));
   EXPECT_EQ(lost(*joined), 0u);
 }
 
-TEST_P(EachFault, NothingIsLostBetweenGarbageAndOutOfStep) {
+TEST_P(EachMotorFault, NothingIsLostBetweenGarbageAndOutOfStep) {
   std::vector<FaultEntry> entries{{{"kind", "motor_reorder"}},
                                   {{"kind", "motor_garbage"}, {"size", "20"}},
                                   {{"kind", "motor_merge"}, {"delay_s", "0.03"}, {"p", "1"}},
@@ -107,19 +107,19 @@ TEST_P(EachFault, NothingIsLostBetweenGarbageAndOutOfStep) {
   }
 }
 
-TEST_P(EachFault, TruncatedReplies) {
+TEST_P(EachMotorFault, TruncatedReplies) {
   for (const char* size : {"0", "1", "2", "6", "9"}) {
     EXPECT_GT(run_one({{"kind", "motor_truncate"}, {"size", size}}).counters().timeouts, 0u) << size;
   }
 }
 
-TEST_P(EachFault, StallsWithinAReply) {
+TEST_P(EachMotorFault, StallsWithinAReply) {
   run_one({{"kind", "motor_stall"}, {"size", "4"}, {"delay_s", "0.05"}});
   run_one({{"kind", "motor_stall"}, {"size", "4"}, {"delay_s", "0.15"}, {"count", "1"}});
   EXPECT_GT(joined->counters().resyncs, 0u);
 }
 
-TEST_P(EachFault, ALineThatFallsFarBehindIsNoStaleAnswer) {
+TEST_P(EachMotorFault, ALineThatFallsFarBehindIsNoStaleAnswer) {
   join(
       script(
           {{{"kind", "motor_stall"}, {"size", "4"}, {"delay_s", "0.15"}, {"at_s", "3"}, {"for_s", "1"}, {"p", "0.1"}}}),
@@ -130,13 +130,13 @@ TEST_P(EachFault, ALineThatFallsFarBehindIsNoStaleAnswer) {
   EXPECT_GT(joined->counters().late_replies, 0u);
 }
 
-TEST_P(EachFault, LatencyAboveTheTimeoutIsNoStaleAnswer) {
+TEST_P(EachMotorFault, LatencyAboveTheTimeoutIsNoStaleAnswer) {
   run(script({{{"kind", "motor_delay"}, {"at_s", "3"}, {"count", "1"}, {"delay_s", "0.15"}}}));
   EXPECT_GT(joined->counters().late_replies, 0u);
   EXPECT_EQ(joined->failures(), 0);
 }
 
-TEST_P(EachFault, ImpossibleNumbers) {
+TEST_P(EachMotorFault, ImpossibleNumbers) {
   for (const char* value : {"nan", "inf", "-inf"}) {
     Joined& j = run_one({{"kind", "motor_value"}, {"value", value}, {"type", "50"}, {"sub", "13"}});
     EXPECT_EQ(j.counters().bad_values, done(sim::FaultKind::motor_value));
@@ -146,7 +146,7 @@ TEST_P(EachFault, ImpossibleNumbers) {
   run_one({{"kind", "motor_value"}, {"value", "denormal"}, {"type", "50"}, {"sub", "13"}});
 }
 
-TEST_P(EachFault, WrongLengths) {
+TEST_P(EachMotorFault, WrongLengths) {
   for (const char* size : {"0", "2", "5", "16"}) {
     const Counters& c =
         run_one({{"kind", "motor_wrong_length"}, {"size", size}, {"type", "50"}, {"sub", "13"}}).counters();
@@ -154,16 +154,16 @@ TEST_P(EachFault, WrongLengths) {
   }
 }
 
-TEST_P(EachFault, WrongIds) {
+TEST_P(EachMotorFault, WrongIds) {
   for (const char* id : {"7", "63"}) {
     const Counters& c = run_one({{"kind", "motor_wrong_id"}, {"id", id}}).counters();
     EXPECT_EQ(c.wrong_module, done(sim::FaultKind::motor_wrong_id)) << id;
   }
 }
 
-TEST_P(EachFault, StuckValuesAreDeliveredAsSent) { run_one({{"kind", "motor_stuck"}, {"p", "1"}}); }
+TEST_P(EachMotorFault, StuckValuesAreDeliveredAsSent) { run_one({{"kind", "motor_stuck"}, {"p", "1"}}); }
 
-TEST_P(EachFault, ABreakShorterThanPatience) {
+TEST_P(EachMotorFault, ABreakShorterThanPatience) {
   for (const char* kind : {"motor_mute", "motor_deaf"}) {
     SCOPED_TRACE(kind);
     run(script({{{"kind", kind}, {"at_s", "3"}, {"for_s", "0.3"}}}));
@@ -172,7 +172,7 @@ TEST_P(EachFault, ABreakShorterThanPatience) {
   }
 }
 
-TEST_P(EachFault, ABreakLongerThanPatienceEndsTheMotion) {
+TEST_P(EachMotorFault, ABreakLongerThanPatienceEndsTheMotion) {
   for (const char* kind : {"motor_mute", "motor_deaf"}) {
     SCOPED_TRACE(kind);
     run(script({{{"kind", kind}, {"at_s", "3"}, {"for_s", "2.5"}}}), 8s);
@@ -183,16 +183,16 @@ TEST_P(EachFault, ABreakLongerThanPatienceEndsTheMotion) {
   }
 }
 
-TEST_P(EachFault, FlippedCommandsLoseNoSafety) {
+TEST_P(EachMotorFault, FlippedCommandsLoseNoSafety) {
   run(script({{{"kind", "motor_command_flip"}, {"at_s", "3"}, {"for_s", "4"}, {"p", "0.01"}}}), 6500ms);
   EXPECT_GT(joined->counters().timeouts, 0u);
 }
 
-TEST_P(EachFault, CommandsFlippedWhileItConnects) {
+TEST_P(EachMotorFault, CommandsFlippedWhileItConnects) {
   run(script({{{"kind", "motor_command_flip"}, {"at_s", "0"}, {"for_s", "2"}, {"p", "0.01"}}}), 6s);
 }
 
-TEST_P(EachFault, UnpluggedAndPluggedInAgain) {
+TEST_P(EachMotorFault, UnpluggedAndPluggedInAgain) {
   run(script({{{"kind", "motor_unplug"}, {"at_s", "3"}, {"for_s", "1"}}}), 6s);
   EXPECT_TRUE(joined->saw(EventKind::motor_port_lost));
   if (joined->module().singing()) return;  // as above
@@ -200,7 +200,7 @@ TEST_P(EachFault, UnpluggedAndPluggedInAgain) {
   EXPECT_FALSE(joined->session().armed()) << "until the owner rearms it";
 }
 
-TEST_P(EachFault, AnotherModulePluggedInIsToldNothingButCoast) {
+TEST_P(EachMotorFault, AnotherModulePluggedInIsToldNothingButCoast) {
   run(script({{{"kind", "motor_unplug"}, {"at_s", "3"}, {"for_s", "1"}, {"other", "true"}}}), 6s);
   EXPECT_TRUE(joined->saw(EventKind::motor_another_module));
   EXPECT_NE(joined->session().state(), Session::State::ready);
@@ -208,7 +208,7 @@ TEST_P(EachFault, AnotherModulePluggedInIsToldNothingButCoast) {
   EXPECT_LT(joined->module().last_motion().target, 1) << "it never spun";
 }
 
-TEST_P(EachFault, ABrownOutIsSeenAndDisarms) {
+TEST_P(EachMotorFault, ABrownOutIsSeenAndDisarms) {
   for (const char* down : {"0", "0.2", "0.8"}) {
     SCOPED_TRACE(down);
     run(script({{{"kind", "motor_brown_out"}, {"at_s", "3"}, {"down_s", down}}}), 7s);
@@ -219,16 +219,16 @@ TEST_P(EachFault, ABrownOutIsSeenAndDisarms) {
   }
 }
 
-TEST_P(EachFault, SetsAreIgnored) { run(script({{{"kind", "motor_ignore_sets"}, {"at_s", "3"}, {"for_s", "2"}}}), 5s); }
+TEST_P(EachMotorFault, SetsAreIgnored) { run(script({{{"kind", "motor_ignore_sets"}, {"at_s", "3"}, {"for_s", "2"}}}), 5s); }
 
-TEST_P(EachFault, SetsAreIgnoredWhileItConnects) {
+TEST_P(EachMotorFault, SetsAreIgnoredWhileItConnects) {
   manner.module_timeout_s = 0.4;  // the module's own is 0.5
   const Joined& j = join(script({{{"kind", "motor_ignore_sets"}, {"at_s", "0"}, {"for_s", "1"}}}), 900ms);
   EXPECT_NE(j.session().state(), Session::State::ready) << "a module that takes no timeout may not spin";
   EXPECT_EQ(j.motor().speed, 0);
 }
 
-TEST_P(EachFault, CoastIsRepeatedUntilTheModuleHearsAgain) {
+TEST_P(EachMotorFault, CoastIsRepeatedUntilTheModuleHearsAgain) {
   join(script({{{"kind", "motor_deaf"}, {"at_s", "3"}, {"for_s", "0.25"}}}), 3100ms);
   EXPECT_EQ(joined->module().drive().mode, sim::MotorDrive::Mode::velocity);
   joined->finish();
@@ -237,19 +237,19 @@ TEST_P(EachFault, CoastIsRepeatedUntilTheModuleHearsAgain) {
   EXPECT_TRUE(joined->session().coasting());
 }
 
-TEST_P(EachFault, ADeadLineLeavesTheModuleToItsOwnTimeout) {
+TEST_P(EachMotorFault, ADeadLineLeavesTheModuleToItsOwnTimeout) {
   join(script({{{"kind", "motor_deaf"}, {"at_s", "3"}, {"for_s", "100"}}}), 3700ms);
   EXPECT_EQ(joined->module().drive().mode, sim::MotorDrive::Mode::coast);
   EXPECT_EQ(joined->module().timeouts(), 1u);
 }
 
-TEST_P(EachFault, ADumbModuleThatIgnoresTheCoastIsLeftToItsTimeout) {
+TEST_P(EachMotorFault, ADumbModuleThatIgnoresTheCoastIsLeftToItsTimeout) {
   join(script({{{"kind", "motor_ignore_sets"}, {"at_s", "3"}, {"for_s", "100"}}}), 3500ms).finish();
   EXPECT_EQ(joined->danger(), "") << "polling must not keep it alive";
   EXPECT_EQ(joined->module().timeouts(), 1u);
 }
 
-TEST_P(EachFault, ASpeedTakenBackNeverReachesThePort) {
+TEST_P(EachMotorFault, ASpeedTakenBackNeverReachesThePort) {
   manner.port_takes = 2;  // frames wait in the driver
   join({}, 4s).finish();
   const Instant before = joined->module().last_motion().at;
@@ -262,7 +262,7 @@ TEST_P(EachFault, ASpeedTakenBackNeverReachesThePort) {
   EXPECT_LT(joined->motor().speed, 1);
 }
 
-TEST_P(EachFault, PhysicsMayGoWrongWithoutTheAccount) {
+TEST_P(EachMotorFault, PhysicsMayGoWrongWithoutTheAccount) {
   for (const FaultEntry& entry : std::vector<FaultEntry>{{{"kind", "motor_hot"}, {"coil_celsius", "150"}},
                                                          {{"kind", "motor_hot"}, {"controller_celsius", "75"}},
                                                          {{"kind", "motor_redline"}, {"speed_rad_s", "300"}},
@@ -277,7 +277,7 @@ TEST_P(EachFault, PhysicsMayGoWrongWithoutTheAccount) {
   }
 }
 
-TEST_P(EachFault, DeratesAreDelivered) {
+TEST_P(EachMotorFault, DeratesAreDelivered) {
   run(script({{{"kind", "motor_redline"}, {"speed_rad_s", "300"}, {"at_s", "3"}, {"for_s", "1"}}}), 3s);
   EXPECT_TRUE(std::any_of(joined->readings().begin(), joined->readings().end(),
                           [](const MotorReading& r) { return r.channel == MotorChannel::derate && r.value < 1; }));
@@ -291,7 +291,7 @@ const Mode kModes[] = {
     {"WithoutWireTimeAsModule42", {.paced = false, .module_id = 42, .reply_latency = 0s, .reply_jitter = 0s}},
 };
 
-INSTANTIATE_TEST_SUITE_P(, EachFault, testing::ValuesIn(kModes),
+INSTANTIATE_TEST_SUITE_P(, EachMotorFault, testing::ValuesIn(kModes),
                          [](const auto& mode) { return std::string(mode.param.name); });
 
 }  // namespace each_fault_test

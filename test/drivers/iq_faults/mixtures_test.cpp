@@ -80,9 +80,9 @@ void add_upheaval(Dice& dice, sim::FaultScript& script) {
 /// One request timeout, a slow adapter, and until the next poll is answered.
 Duration recovery(const Manner& manner) { return 120ms + manner.usb_tick + 2 * from_seconds(1 / manner.telemetry_hz); }
 
-class Mixtures : public testing::TestWithParam<int> {};
+class MotorMixtures : public testing::TestWithParam<int> {};
 
-TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
+TEST_P(MotorMixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
   for (int i = 0; i < 10; ++i) {
     const auto seed = static_cast<std::uint64_t>(GetParam() * 10 + i);
     Dice dice(seed);
@@ -121,7 +121,7 @@ TEST_P(Mixtures, NothingWrongIsDeliveredAndNothingSpinsOn) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, 20));
+INSTANTIATE_TEST_SUITE_P(TenSeedsEach, MotorMixtures, testing::Range(0, 20));
 
 }  // namespace mixtures_test
 }  // namespace kphi::iq::test

@@ -95,7 +95,7 @@ INSTANTIATE_TEST_SUITE_P(, OfEachFault, testing::Combine(kModes, testing::Values
   return std::string(std::get<1>(one.param).name) + std::get<0>(one.param).name;
 });
 
-class EachFault : public testing::TestWithParam<Mode> {
+class EachBoxFault : public testing::TestWithParam<Mode> {
  protected:
   Joined& run(const std::vector<std::string>& faults, Instant end = 3s) {
     run_in(joined, GetParam().manner, faults, end);
@@ -105,9 +105,9 @@ class EachFault : public testing::TestWithParam<Mode> {
   std::optional<Joined> joined;
 };
 
-INSTANTIATE_TEST_SUITE_P(, EachFault, kModes, [](const auto& mode) { return std::string(mode.param.name); });
+INSTANTIATE_TEST_SUITE_P(, EachBoxFault, kModes, [](const auto& mode) { return std::string(mode.param.name); });
 
-TEST_P(EachFault, AStreamTakenOverStoppedOrElsewhereStaysSilent) {
+TEST_P(EachBoxFault, AStreamTakenOverStoppedOrElsewhereStaysSilent) {
   for (const char* fault : {"taken_over at_s=1.5", "rate at_s=1.5 rate_hz=500", "address at_s=1.5 address=127.0.0.2"}) {
     SCOPED_TRACE(fault);
     Manner manner = GetParam().manner;
@@ -120,7 +120,7 @@ TEST_P(EachFault, AStreamTakenOverStoppedOrElsewhereStaysSilent) {
   }
 }
 
-TEST_P(EachFault, AdjacentSwaps) {
+TEST_P(EachBoxFault, AdjacentSwaps) {
   const Counters& c = run({"reorder at_s=0.5 for_s=2 p=0.1 depth=1"}).counters();
   EXPECT_EQ(c.lost_network, 0u);
   if (!slow()) {
@@ -128,7 +128,7 @@ TEST_P(EachFault, AdjacentSwaps) {
   }
 }
 
-TEST_P(EachFault, ShortBlocksLackTheirLastRecords) {
+TEST_P(EachBoxFault, ShortBlocksLackTheirLastRecords) {
   run({"short_block at_s=0.5 for_s=2 p=0.1 records=5"});
   EXPECT_EQ(joined->counters().lost_network, joined->wire().truth().records_left_out);
   if (GetParam().manner.records_per_datagram > 1) {
@@ -136,7 +136,7 @@ TEST_P(EachFault, ShortBlocksLackTheirLastRecords) {
   }
 }
 
-TEST_P(EachFault, WrongSizes) {
+TEST_P(EachBoxFault, WrongSizes) {
   for (const char* size : {"0", "1", "35", "37", "71", "1441", "1476"}) {
     run({std::string("wrong_size at_s=0.5 for_s=1 p=0.1 size=") + size});
     EXPECT_GT(joined->counters().malformed, 0u) << size;
@@ -144,30 +144,30 @@ TEST_P(EachFault, WrongSizes) {
   }
 }
 
-TEST_P(EachFault, ForeignSourcesAreNotHeard) {
+TEST_P(EachBoxFault, ForeignSourcesAreNotHeard) {
   run({"foreign_source at_s=0 for_s=2 p=0.5"});
   EXPECT_GT(joined->wire().truth().foreign, 0u);
 }
 
-TEST_P(EachFault, LostStarts) {
+TEST_P(EachBoxFault, LostStarts) {
   run({"lost_start at_s=0 count=3"}, 6s);
   EXPECT_EQ(joined->wire().truth().starts, 4u);
 }
 
-TEST_P(EachFault, StreamTakenOverIsTakenBackWhenAsked) {
+TEST_P(EachBoxFault, StreamTakenOverIsTakenBackWhenAsked) {
   run({"taken_over at_s=1.5"}, 5s);
   EXPECT_EQ(joined->silences(), 1);
   EXPECT_EQ(joined->counters().restarts, 1u);
   EXPECT_GT(joined->counters().lost_network, 0u);
 }
 
-TEST_P(EachFault, RebootWithoutResume) {
+TEST_P(EachBoxFault, RebootWithoutResume) {
   run({"reboot at_s=1.5 down_s=0.2"}, 6s);
   EXPECT_EQ(joined->counters().reboots, 1u);
   EXPECT_EQ(joined->silences(), 1);
 }
 
-TEST_P(EachFault, AnOverrunIsIrregularAndItsSamplesAreMissing) {
+TEST_P(EachBoxFault, AnOverrunIsIrregularAndItsSamplesAreMissing) {
   for (const char* samples : {"1", "3", "50", "1000"}) {
     run({std::string("overrun at_s=1.5 samples=") + samples});
     EXPECT_EQ(joined->counters().irregular, 1u) << samples;
@@ -176,7 +176,7 @@ TEST_P(EachFault, AnOverrunIsIrregularAndItsSamplesAreMissing) {
   }
 }
 
-TEST_P(EachFault, AChangedRateIsIrregular) {
+TEST_P(EachBoxFault, AChangedRateIsIrregular) {
   Manner manner = GetParam().manner;
   manner.quirks.rate_write = sim::NetBoxQuirks::RateWrite::continues;
   Joined j(manner, fault_script({"rate at_s=1.5 rate_hz=500"}), 42);
@@ -185,26 +185,26 @@ TEST_P(EachFault, AChangedRateIsIrregular) {
   EXPECT_EQ(j.wire().truth().done.at(sim::FaultKind::rate), 1u);
 }
 
-TEST_P(EachFault, AnAddressGivenBackIsALongGap) {
+TEST_P(EachBoxFault, AnAddressGivenBackIsALongGap) {
   run({"address at_s=1.5 for_s=0.3 address=127.0.0.2"});
   EXPECT_NEAR(static_cast<double>(joined->counters().lost_network), 2100.0 / GetParam().manner.divisor, 41);
 }
 
-TEST_P(EachFault, ZeroDriftIsInTheRecordsOnly) {
+TEST_P(EachBoxFault, ZeroDriftIsInTheRecordsOnly) {
   run({"zero_drift at_s=0 axis=0 amount=-2 tau_s=1"});
   const LoadCellRecord& last = joined->out().back();
   EXPECT_NEAR(last.counts[0], -2e6 * (1 - std::exp(-to_seconds(last.arrival()))), 2e4);
   EXPECT_EQ(joined->counters().lost_network, 0u);
 }
 
-TEST_P(EachFault, UnitsChangedMidRunScaleTheCounts) {
+TEST_P(EachBoxFault, UnitsChangedMidRunScaleTheCounts) {
   run({"units at_s=1.5 force_unit=1"});
   EXPECT_EQ(joined->out().back().counts[2], 0) << "at 1 count per lbf";
   EXPECT_EQ(joined->counters().lost_network, 0u);
 }
 
 /// Momentary: gone with the fault. Latched: until a power cycle.
-TEST_P(EachFault, EveryStatusBitMomentaryAndLatched) {
+TEST_P(EachBoxFault, EveryStatusBitMomentaryAndLatched) {
   for (unsigned bit = 0; bit < 32; ++bit) {
     for (const bool latched : {false, true}) {
       const std::uint32_t bits = 1u << bit;
@@ -221,14 +221,14 @@ TEST_P(EachFault, EveryStatusBitMomentaryAndLatched) {
   }
 }
 
-TEST_P(EachFault, StatusBitsDoNotTouchTheAccount) {
+TEST_P(EachBoxFault, StatusBitsDoNotTouchTheAccount) {
   run({"status at_s=1 for_s=0.5 bits=0x80400000"});
   const auto bad = std::count_if(joined->out().begin(), joined->out().end(),
                                  [](const LoadCellRecord& r) { return r.status == 0x80400000u; });
   EXPECT_NEAR(static_cast<double>(bad), 3500.0 / GetParam().manner.divisor, 1);
 }
 
-TEST_P(EachFault, SaturationIsInTheRecords) {
+TEST_P(EachBoxFault, SaturationIsInTheRecords) {
   run({"saturation at_s=1 for_s=0.5 axes=4"});
   for (const LoadCellRecord& r : joined->out()) ASSERT_EQ(r.status == 0x80020000u, r.counts[2] == 60'000'000);
 }

@@ -134,13 +134,13 @@ int mixtures() {
   return asked ? std::atoi(asked) : 200;
 }
 
-class Mixtures : public testing::TestWithParam<int> {};
+class BoxMixtures : public testing::TestWithParam<int> {};
 
-TEST_P(Mixtures, AccountEqualsTruth) {
+TEST_P(BoxMixtures, AccountEqualsTruth) {
   for (int i = 0; i < kSeedsInOne; ++i) expect_agreement(static_cast<std::uint64_t>(GetParam() * kSeedsInOne + i));
 }
 
-INSTANTIATE_TEST_SUITE_P(TenSeedsEach, Mixtures, testing::Range(0, mixtures() / kSeedsInOne));
+INSTANTIATE_TEST_SUITE_P(TenSeedsEach, BoxMixtures, testing::Range(0, mixtures() / kSeedsInOne));
 
 /// A boot 0.37 s behind the wrap of ft_sequence, the stream not coming on: what the box has counted until it is asked
 /// again looks like a step forward.

@@ -69,7 +69,7 @@ std::vector<std::string> findings_of(const SerialLine& line, const ProbeSettings
   return lines;
 }
 
-TEST(Probe, SaysUnderWhichIdTheModuleAnswers) {
+TEST(ModuleProbe, SaysUnderWhichIdTheModuleAnswers) {
   ModuleOnALine line([](Module& m) { give_id(m, 7); });
   const auto lines = findings_of({line.device(), 115200, 0});
   ASSERT_EQ(lines.size(), 2u);
@@ -77,14 +77,14 @@ TEST(Probe, SaysUnderWhichIdTheModuleAnswers) {
   EXPECT_TRUE(only_coasted(line));
 }
 
-TEST(Probe, SaysWhereItSearchedInVain) {
+TEST(ModuleProbe, SaysWhereItSearchedInVain) {
   ModuleOnALine line([](Module& m) { m.mute = true; });
   const auto lines = findings_of({line.device(), 115200, 0});
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_THAT(lines[1], HasSubstr("note: searched for it at 115200, 921600, 1000000"));
 }
 
-TEST(Probe, SearchesOnlyWhenAskedAndOnlyForASilentModuleAndSaysWhyNobodyAnswers) {
+TEST(ModuleProbe, SearchesOnlyWhenAskedAndOnlyForASilentModuleAndSaysWhyNobodyAnswers) {
   ModuleOnALine silent([](Module& m) { m.mute = true; });
   ModuleOnALine stubborn([](Module& m) {
     m.ignore_sets = true;
@@ -100,7 +100,7 @@ TEST(Probe, SearchesOnlyWhenAskedAndOnlyForASilentModuleAndSaysWhyNobodyAnswers)
   EXPECT_EQ(findings_of({"/dev/no_such_tty", 115200, 0}).size(), 1u);
 }
 
-TEST(Probe, CoastsBeforeItAsksAnythingElseAndLeavesTheMotorCoasting) {
+TEST(ModuleProbe, CoastsBeforeItAsksAnythingElseAndLeavesTheMotorCoasting) {
   ModuleOnALine line([](Module& m) { m.values[{50, 0}] = fake::u8(3); });  // left spinning by a program that died
   EXPECT_TRUE(probe({line.device(), 115200, 0}, kClock).answers());
   line.with([](Module& m) {
@@ -111,7 +111,7 @@ TEST(Probe, CoastsBeforeItAsksAnythingElseAndLeavesTheMotorCoasting) {
   EXPECT_TRUE(line.left_coasting());
 }
 
-TEST(Probe, ReadsAWholeAudit) {
+TEST(ModuleProbe, ReadsAWholeAudit) {
   ModuleOnALine line;
   line.with([](Module& m) {
     for (const Entry& entry : kEntries) {

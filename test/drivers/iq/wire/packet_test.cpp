@@ -153,7 +153,7 @@ std::vector<std::size_t> chunk_sizes(std::mt19937& random) {
   return sizes;
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef KPHI_SANITIZED
 constexpr std::size_t kManyBytes = 500'000;
 #else
 constexpr std::size_t kManyBytes = 10'000'000;

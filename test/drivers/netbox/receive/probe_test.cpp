@@ -19,7 +19,7 @@ ProbeSettings quick() {
   return settings;
 }
 
-TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
+TEST(BoxProbe, TellsWhoAnswersAndHowWellItStreams) {
   BenchBox bench;
   const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_TRUE(found.answers());
@@ -35,7 +35,7 @@ TEST(Probe, TellsWhoAnswersAndHowWellItStreams) {
   EXPECT_EQ(bench.box.settings_written() + bench.box.biases(), 0) << "a probe changes nothing";
 }
 
-TEST(Probe, SaysThatRdtIsDisabledInsteadOfWaiting) {
+TEST(BoxProbe, SaysThatRdtIsDisabledInsteadOfWaiting) {
   BenchBox bench({}, FakeWeb::page(with(streaming_xml(), "comrdte", "Disabled")));
   const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_FALSE(found.answers());
@@ -45,14 +45,14 @@ TEST(Probe, SaysThatRdtIsDisabledInsteadOfWaiting) {
   EXPECT_EQ(bench.box.starts(), 0);
 }
 
-TEST(Probe, CountsWhatTheNetworkLoses) {
+TEST(BoxProbe, CountsWhatTheNetworkLoses) {
   BenchBox bench({.skip_every = 10});
   const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_TRUE(found.answers());
   EXPECT_THAT(found.lines(), Contains(testing::AllOf(HasSubstr("warning"), HasSubstr("lost in the network"))));
 }
 
-TEST(Probe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
+TEST(BoxProbe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {
   const std::uint16_t closed = closed_port(SOCK_STREAM);
   const SteadyClock clock;
   const Probe found = probe({"127.0.0.1", 1, closed}, clock, quick());

@@ -5,6 +5,7 @@
 #include "base/clock.hpp"
 #include "base/error.hpp"
 #include "test/drivers/netbox/fake_box.hpp"
+#include "test/refusal.hpp"
 
 namespace kphi::netbox::udp_socket_test {
 
