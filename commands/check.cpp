@@ -90,7 +90,7 @@ std::string in_words(const Vehicle& vehicle) {
 
 /// A shape with the occlusion of each arm.
 std::string lines_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
-                             const compensation::Airframe& airframe) {
+                           const compensation::Airframe& airframe) {
   std::string arms, occlusions;
   for (std::size_t i = 0; i < angles.size(); ++i) {
     arms += fmt::format(" {:.6g}", to_degrees(angles[i]));

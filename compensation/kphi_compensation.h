@@ -1,7 +1,7 @@
-// The library that flies, for C, for C++ before C++17 and for stacks that speak arrays: the classes Compensator and Mixer of
-// compensator.hpp and mixing.hpp, number for number. Angles [rad], lengths [m], thrusts [N], torques [N m], speeds
-// [rad/s], coefficients [N/(rad/s)^2]; rotors in the order 0, 1, 2 .. (the paper's 1, 2, 3 ..). Links with a C compiler: needs only
-// the mathematics library.
+// The library that flies, for C, for C++ before C++17 and for stacks that speak arrays: the classes Compensator and
+// Mixer of compensator.hpp and mixing.hpp, number for number. Angles [rad], lengths [m], thrusts [N], torques [N m],
+// speeds [rad/s], coefficients [N/(rad/s)^2]; rotors in the order 0, 1, 2 .. (the paper's 1, 2, 3 ..). Links with a C
+// compiler: needs only the mathematics library.
 //
 // Real-time: no call allocates, locks, or loops without a bound. Not synchronised: call from one thread, or copy the
 // structs (plain bytes). A pointer must not be null; a kphi_compensator or kphi_mixer must come from its build, which
@@ -62,8 +62,8 @@ typedef struct kphi_knot {
   kphi_real error;  // standard uncertainty; HUGE_VAL: unknown
 } kphi_knot;
 
-// What the bench knows of one propeller: k(phi) = intercept + slope phi with K_T measured without occlusion, or a table.
-// Zero-initialise, then fill in.
+// What the bench knows of one propeller: k(phi) = intercept + slope phi with K_T measured without occlusion, or a
+// table. Zero-initialise, then fill in.
 typedef struct kphi_curve {
   kphi_real thrust_coefficient;  // K_T, > 0
   kphi_real intercept;           // > 0
@@ -75,7 +75,7 @@ typedef struct kphi_curve {
   kphi_real intercept_variance;
   kphi_real covariance;
   kphi_real slope_variance;
-  int knot_count;                    // 0: the line; else 2 to 12, and largest_fitted_rad and overlap alone count of the above
+  int knot_count;  // 0: the line; else 2 to 12, and largest_fitted_rad and overlap alone count of the above
   kphi_knot knots[KPHI_MAX_KNOTS];   // k, positive, not rising; the first is K_T
   int torque_count;                  // 0: the drag torque does not depend on phi
   kphi_knot torque[KPHI_MAX_KNOTS];  // drag torque as a share of that at phi 0, at one speed; in (0, 10)
@@ -102,8 +102,8 @@ typedef struct kphi_airframe {
   kphi_real hinge_turn_rad[KPHI_MAX_ROTORS];
   int propellers_differ;  // 0: the next one does not count
   kphi_real propeller_radii[KPHI_MAX_ROTORS];
-  int has_arm_limits;       // 0: -100 to 190 degrees and 2 degrees
-  kphi_real arm_from_rad;   // an angle below it or above arm_to_rad is not believed
+  int has_arm_limits;      // 0: -100 to 190 degrees and 2 degrees
+  kphi_real arm_from_rad;  // an angle below it or above arm_to_rad is not believed
   kphi_real arm_to_rad;
   kphi_real arm_stale_rad;  // how far an arm may have moved since its angle was measured
 } kphi_airframe;
@@ -167,9 +167,9 @@ typedef struct kphi_mixer {
   double state[128];
 } kphi_mixer;
 
-// 1 if the layout can be flown. 3 to 8 hubs [x, y] relative to the centre of gravity, x forward, y left; spins +1 or -1,
-// +1 where the drag torque points along +z (up); drag torque of a rotor = f0 (per_newton + per_square_newton f0), f0 =
-// K_T omega^2.
+// 1 if the layout can be flown. 3 to 8 hubs [x, y] relative to the centre of gravity, x forward, y left; spins +1 or
+// -1, +1 where the drag torque points along +z (up); drag torque of a rotor = f0 (per_newton + per_square_newton f0),
+// f0 = K_T omega^2.
 int kphi_mixer_build(kphi_mixer* out, int rotors, const kphi_real (*hubs)[2], const int* spins,
                      kphi_real drag_per_newton, kphi_real drag_per_square_newton);
 // At servo rate; drag_scale of kphi_drag_scale, each > 0. 0, and the layout before is kept, if this one cannot be
@@ -179,8 +179,8 @@ int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const i
 // [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (no further than to
 // assured_yaw), collective thrust, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_..,
 // KPHI_DEMAND_NAN), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
-int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n, const kphi_real* largest_n,
-             kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]);
+int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n,
+             const kphi_real* largest_n, kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]);
 
 #ifdef __cplusplus
 }

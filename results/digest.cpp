@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
+#include <xxhash.h>
 
 #include <array>
 #include <cerrno>
@@ -13,8 +14,6 @@
 #include "base/error.hpp"
 #include "base/ordered_work.hpp"
 #include "results/file_layer.hpp"
-
-#include <xxhash.h>
 #ifdef __x86_64__
 #include <xxh_x86dispatch.h>  // XXH3 in the widest registers of the processor it runs on
 #endif

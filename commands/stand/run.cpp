@@ -153,7 +153,9 @@ void announce(const RunRequest& request, const DryRun& dry) {
 CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination,
                        Operator& person, live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const SoFar known = so_far(request.campaign, request.options.wishes);
-  const auto& [options, campaign, config, answers] = request;
+  const RunOptions& options = request.options;
+  const profiles::Campaign& campaign = request.campaign;
+  const profiles::BenchConfig& config = request.config;
   const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
   const auto bench = connect_awake(config, stop_asked);

@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-const char *morphingInit(morphingState_t *state, const morphingVehicle_t *vehicle, const float *armAngles) {
+const char* morphingInit(morphingState_t* state, const morphingVehicle_t* vehicle, const float* armAngles) {
   const int refusal =
       kphi_compensator_build(&state->compensator, vehicle->curves, &vehicle->airframe, KPHI_LAW_CLAMPED);
   if (refusal != 0) return kphi_refusal_text(refusal);
@@ -20,16 +20,15 @@ const char *morphingInit(morphingState_t *state, const morphingVehicle_t *vehicl
   return NULL;
 }
 
-void morphingArms(morphingState_t *state, const float *armAngles, const float *rates, float age) {
+void morphingArms(morphingState_t* state, const float* armAngles, const float* rates, float age) {
   float hubs[KPHI_MAX_ROTORS][2], scale[KPHI_MAX_ROTORS];
   kphi_set_moving_arms(&state->compensator, armAngles, rates, age);
   kphi_hubs(&state->compensator, &state->vehicle->masses, hubs);
   kphi_drag_scale(&state->compensator, scale);
-  state->shapeFlies =
-      kphi_mixer_set_layout(&state->mixer, (const float(*)[2])hubs, state->vehicle->spins, scale) != 0;
+  state->shapeFlies = kphi_mixer_set_layout(&state->mixer, (const float(*)[2])hubs, state->vehicle->spins, scale) != 0;
 }
 
-void morphingMix(morphingState_t *state, float thrust, float roll, float pitch, float yaw, float *throttle) {
+void morphingMix(morphingState_t* state, float thrust, float roll, float pitch, float yaw, float* throttle) {
   static const float none[KPHI_MAX_ROTORS] = {0};
   const float wrench[4] = {thrust, roll, pitch, yaw};
   float most[KPHI_MAX_ROTORS], thrusts[KPHI_MAX_ROTORS], uncovered[KPHI_MAX_ROTORS], speeds[KPHI_MAX_ROTORS];

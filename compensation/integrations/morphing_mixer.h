@@ -22,7 +22,7 @@ typedef struct morphingVehicle_s {
 typedef struct morphingState_s {
   kphi_compensator compensator;
   kphi_mixer mixer;
-  const morphingVehicle_t *vehicle;
+  const morphingVehicle_t* vehicle;
   int rotors;
   bool shapeFlies;    // false: the shape of the last arm angles cannot be flown, the one before is kept
   uint32_t flags;     // KPHI_... of all rotors at the last mix
@@ -30,10 +30,10 @@ typedef struct morphingState_s {
 } morphingState_t;
 
 // NULL, or why the vehicle cannot be flown. `armAngles` [rad]: the shape at rest. The vehicle must stay where it is.
-const char *morphingInit(morphingState_t *state, const morphingVehicle_t *vehicle, const float *armAngles);
+const char* morphingInit(morphingState_t* state, const morphingVehicle_t* vehicle, const float* armAngles);
 // At the rate of the servos' feedback: [rad], [rad/s], and how old it is [s].
-void morphingArms(morphingState_t *state, const float *armAngles, const float *rates, float age);
+void morphingArms(morphingState_t* state, const float* armAngles, const float* rates, float age);
 // In the loop: thrust [N] and torques [N m], x forward, y left, z up, to throttle 0..1 of each rotor.
-void morphingMix(morphingState_t *state, float thrust, float roll, float pitch, float yaw, float *throttle);
+void morphingMix(morphingState_t* state, float thrust, float roll, float pitch, float yaw, float* throttle);
 
 #endif

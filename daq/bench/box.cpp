@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kSlots = 16;
 
-
 const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "N m"; }
 
 }  // namespace
@@ -70,8 +69,8 @@ std::optional<StreamEvent> configuration_event(const netbox::Configuration& befo
 std::optional<std::string> noise(const netbox::ZeroMeasurement& zero, std::size_t axis, double limit) {
   const double deviation = zero.standard_deviation[axis];
   if (deviation <= limit) return std::nullopt;  // written so that NaN is refused
-  return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxisNames[axis], deviation, limit,
-                     fmt::arg("unit", unit_of(axis)));
+  return fmt::format("{} is noisy: standard deviation {:.3g} {unit}, limit {:g} {unit}", kAxisNames[axis], deviation,
+                     limit, fmt::arg("unit", unit_of(axis)));
 }
 
 std::optional<std::string> unrest(const netbox::ZeroMeasurement& before) {

@@ -241,7 +241,7 @@ class Server::Impl::Client : public std::enable_shared_from_this<Client> {
   }
 
   Impl& impl_;
-  websocket::stream<beast::tcp_stream> stream_;
+  websocket::stream<beast::tcp_stream, false> stream_;
   beast::flat_buffer read_buffer_;
   std::deque<Text> waiting_;
   Text newest_, under_way_;

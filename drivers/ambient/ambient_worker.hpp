@@ -35,8 +35,8 @@ class AmbientWorker {
 
   /// Opens nothing yet; `clock` must outlive this.
   AmbientWorker(Open open, const Clock& clock, const Rhythm& rhythm = {});
-  /// Waits for a reading in progress and until the sensor is closed, 0.2 s, but no longer than `kPatience`: some bridges
-  /// take eleven seconds to close, and go on with that alone.
+  /// Waits for a reading in progress and until the sensor is closed, 0.2 s, but no longer than `kPatience`: some
+  /// bridges take eleven seconds to close, and go on with that alone.
   ~AmbientWorker();
   static constexpr Duration kPatience = std::chrono::seconds(1);
 

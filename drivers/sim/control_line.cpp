@@ -90,7 +90,8 @@ std::string control_answer(SimulatedBench& bench, std::string_view line) {
   if (words.size() == 3 && words[0] == "hang") return hang(bench, words[1], words[2]);
   if (words.size() == 1 && words[0] == "status") return status(bench);
   if (words.size() > 1 && words[0] == "fault") return fail(bench, words);
-  return "error unknown command; use `mount PROPELLER DEGREES`, `hang AXIS NEWTONS`, `status` or `fault kind=supply_...`";
+  return "error unknown command; use `mount PROPELLER DEGREES`, `hang AXIS NEWTONS`, `status` or `fault "
+         "kind=supply_...`";
 }
 
 std::string control_path(const std::string& configured) {

@@ -1,5 +1,6 @@
 // The control socket of the simulated bench, by which a person or a campaign mounts propellers: a Unix-domain socket,
-// one line in, one line out. `mount 5x3 90` -> `ok 5x3 90`; `hang z 4.9` -> `ok z 4.9` (a weight, N); `status` -> one line of JSON; else `error …`.
+// one line in, one line out. `mount 5x3 90` -> `ok 5x3 90`; `hang z 4.9` -> `ok z 4.9` (a weight, N); `status` -> one
+// line of JSON; else `error …`.
 #pragma once
 
 #include <string>

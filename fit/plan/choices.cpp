@@ -306,8 +306,9 @@ std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) 
   for (const std::string& name : answer.as_written.told.front().not_known()) unknown.insert(name);
   if (!unknown.empty()) text += fmt::format("unknown and not in it: {} (see --u)\n", fmt::join(unknown, ", "));
   for (const Unreachable& one : answer.unreachable)
-    text += fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n",
-                        one.wish.of.name(), share_words(one.wish.share), share_words(one.best), kMostRepetitions, one.because);
+    text +=
+        fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n", one.wish.of.name(),
+                    share_words(one.wish.share), share_words(one.best), kMostRepetitions, one.because);
   return text;
 }
 

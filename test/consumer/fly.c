@@ -38,7 +38,8 @@ int main(void) {
   kphi_speeds_for(&compensator, thrusts, speeds, flags);
   for (int i = 0; i < 4; ++i) printf("%.1f\n", (double)(speeds[i] * 30 / PI));
 
-  const kphi_masses masses = {(kphi_real)0.42, {0, 0}, {(kphi_real)0.045, (kphi_real)0.045, (kphi_real)0.045, (kphi_real)0.045}};
+  const kphi_masses masses = {
+      (kphi_real)0.42, {0, 0}, {(kphi_real)0.045, (kphi_real)0.045, (kphi_real)0.045, (kphi_real)0.045}};
   const int spins[4] = {1, -1, 1, -1};
   const kphi_real hover[4] = {6, 0, 0, 0}, smallest[4] = {0};
   kphi_real hubs[4][2], scale[4], largest[4], mixed[4];

@@ -9,7 +9,6 @@
 #include <array>
 #include <boost/asio.hpp>
 #include <regex>
-#include <regex>
 #include <thread>
 
 #include "results/run_reader.hpp"

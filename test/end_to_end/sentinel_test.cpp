@@ -12,7 +12,7 @@
 namespace kphi::test::sentinel_test {
 
 constexpr double kModuleCoasts_ms = 500 + 50;
-constexpr double kSoon_s = 1, kWholeRun_s = 9;     // from the start of the program into its second run
+constexpr double kSoon_s = 1, kWholeRun_s = 9;  // from the start of the program into its second run
 constexpr double kMost_mb = 3;
 constexpr auto kLimit = std::chrono::seconds(1);
 

@@ -12,7 +12,7 @@ namespace {
 constexpr double kIntegralMax = 3.0;        // V
 constexpr double kBusCapacitance = 270e-6;  // F: the capacitor that the vendor supplies
 constexpr double kApproach = 0.5;           // of the way to the voltage limit, per tick
-constexpr double kShortOfVoltage = 1e-3;         // V
+constexpr double kShortOfVoltage = 1e-3;    // V
 
 /// A current at which regeneration lifts the bus no further than it may within one tick; the firmware's own tick is
 /// much shorter, so it can wait and see. `emf` and the result are of the turning direction.

@@ -72,7 +72,8 @@ void IqDevice::advance(Instant now) noexcept {
   }
   if (++ticks_ % kTicksPerSafety == 0) {
     const IqReadings readings = sensors_.readings(*state_);
-    if (!settings_.quirks.no_power_safety && safety_.check(memory_, readings) && memory_.value(84, 2) != 0) rest(MotorDrive::Mode::coast);
+    if (!settings_.quirks.no_power_safety && safety_.check(memory_, readings) && memory_.value(84, 2) != 0)
+      rest(MotorDrive::Mode::coast);
     const double coil = settings_.quirks.legacy ? derate(memory_, 77, 1, readings.coil_celsius)
                                                 : derate(memory_, 83, 8, readings.coil_celsius);
     limits_.thermal = coil * derate(memory_, 73, 3, readings.controller_celsius);

@@ -28,7 +28,7 @@ struct LoadCellParameters {
   Wrench zero_spread{0.3, 0.3, 0.4, 5e-3, 5e-3, 3e-3};              ///< zero offset of a power-up: uniform within ±
   Wrench drift_per_minute{8e-4, -6e-4, 2e-3, 2e-5, -2e-5, 1e-5};    ///< linear
   Wrench walk_per_root_minute{2e-4, 2e-4, 4e-4, 6e-6, 6e-6, 6e-6};  ///< random walk: deviation after one minute
-  double gain = 1;                    ///< of all axes: what it reads per true load
+  double gain = 1;                                                  ///< of all axes: what it reads per true load
   double hysteresis = 0;              ///< share of the largest weight that hung on it, read once it is gone
   double slow_noise = 0;              ///< deviation in Fz, N, of noise with a memory of slow_noise_seconds
   double slow_noise_seconds = 1;      ///< its correlation falls to 1/e in this time

@@ -35,5 +35,5 @@ static void fault(void) {
 }
 
 __attribute__((section(".vectors"), used)) static const void* const vectors[16] = {
-    &stack_end, (const void*)begin, (const void*)fault, (const void*)fault, (const void*)fault,
-    (const void*)fault, (const void*)fault};
+    &stack_end,         (const void*)begin, (const void*)fault, (const void*)fault,
+    (const void*)fault, (const void*)fault, (const void*)fault};

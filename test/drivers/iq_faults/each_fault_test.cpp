@@ -74,7 +74,9 @@ TEST_P(EachMotorFault, NoneAtAll) {
   EXPECT_TRUE(j.session().coasting());
 }
 
-TEST_P(EachMotorFault, FlippedBits) { EXPECT_GT(run_one({{"kind", "motor_flip"}, {"bits", "3"}}).counters().timeouts, 0u); }
+TEST_P(EachMotorFault, FlippedBits) {
+  EXPECT_GT(run_one({{"kind", "motor_flip"}, {"bits", "3"}}).counters().timeouts, 0u);
+}
 
 TEST_P(EachMotorFault, BadChecksums) {
   const Counters& c = run_one({{"kind", "motor_bad_crc"}}).counters();
@@ -219,7 +221,9 @@ TEST_P(EachMotorFault, ABrownOutIsSeenAndDisarms) {
   }
 }
 
-TEST_P(EachMotorFault, SetsAreIgnored) { run(script({{{"kind", "motor_ignore_sets"}, {"at_s", "3"}, {"for_s", "2"}}}), 5s); }
+TEST_P(EachMotorFault, SetsAreIgnored) {
+  run(script({{{"kind", "motor_ignore_sets"}, {"at_s", "3"}, {"for_s", "2"}}}), 5s);
+}
 
 TEST_P(EachMotorFault, SetsAreIgnoredWhileItConnects) {
   manner.module_timeout_s = 0.4;  // the module's own is 0.5

@@ -57,8 +57,8 @@ TEST(Csv, ReadsBlocksAsItReadsTheWhole) {
     }
     blocks.push_back(std::string_view(text).substr(begin));
     std::size_t next = 0;
-    const Table table =
-        read_csv(TextBlocks([&] { return next < blocks.size() ? blocks[next++] : std::string_view(); }, text.size()), "t.csv");
+    const Table table = read_csv(
+        TextBlocks([&] { return next < blocks.size() ? blocks[next++] : std::string_view(); }, text.size()), "t.csv");
     EXPECT_EQ(table.header, whole.header) << cuts;
     ASSERT_EQ(table.rows.size(), whole.rows.size()) << cuts;
     EXPECT_EQ(table.rows[1].line, whole.rows[1].line);
