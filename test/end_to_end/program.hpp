@@ -26,6 +26,13 @@ struct Ended {
   [[nodiscard]] std::string folder() const { return out.substr(0, out.find('\n')); }
 };
 
+/// `held`. If it is false, no standstill of this computer excuses that, and the test is not run again: the motor turned
+/// for too long, or the power stayed on.
+inline bool safely(bool held) {
+  if (!held) testing::Test::RecordProperty("stands", "not safe");
+  return held;
+}
+
 /// Runs the command to its end, and holds that this is its exit code.
 inline Ended ran(const std::vector<std::string>& command, int exit_code = 0) {
   Process process(command);

@@ -116,6 +116,8 @@ TEST_P(SleepingComputer, TellsNoMotorToTurnWhenItWakes) {
   host_->complete(*awakening_);
   tell();
   SCOPED_TRACE(awakening_->words);
+  (void)safely(awakening_->told_to_turn() == 0 && awakening_->stage_at_the_end() == "coast" &&
+               !awakening_->output_is_on);
   EXPECT_EQ(awakening_->told_to_turn(), 0);
   EXPECT_EQ(awakening_->stage_at_the_end(), "coast");
   EXPECT_FALSE(awakening_->output_is_on) << "of the supply";
