@@ -18,7 +18,7 @@ namespace kphi::netbox {
 inline constexpr std::size_t kCalinfoBytes = 24;
 
 struct Calinfo {
-  std::uint8_t force_unit = 0, torque_unit = 0;  ///< codes of units.hpp
+  std::uint8_t force_unit = 0, torque_unit = 0;  ///< codes of wire/unit.hpp
   std::uint32_t counts_per_force = 0, counts_per_torque = 0;
   friend bool operator==(const Calinfo&, const Calinfo&) = default;
 };
