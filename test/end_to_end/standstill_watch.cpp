@@ -25,7 +25,7 @@ constexpr int kProgramsPriority = 10;     // of SCHED_FIFO: in_real_time() gives
 constexpr double kRealTimeLimit_ms = 25;  // half of the 50 ms in which the guard's order to coast goes out
 constexpr double kUsualLimit_ms = 145;    // silence of a stream that the guard tolerates
 constexpr double kHandedOnLimit_ms = 70;  // a question and its answer within that silence
-constexpr timespec kNap{0, 5'000'000};
+constexpr timespec kNap{0, 10'000'000};
 
 /// A pseudo-terminal that tells nobody but us what is written to it.
 class Line {
