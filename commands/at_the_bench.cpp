@@ -16,6 +16,18 @@ bool has_terminal() {
   return isatty(STDERR_FILENO) && !(term && std::string(term) == "dumb");
 }
 
+std::optional<daq::Key> KeysAtTheStand::next() {
+  if (suspends_ && daq::SignalWatch::take_suspension()) terminal_.suspend();
+  if (const auto key = terminal_.next_key()) return key;
+  return view_.take_key();
+}
+
+void KeysAtTheStand::forget(const std::function<void()>& poll) {
+  terminal_.forget_keys(poll);
+  while (view_.take_key()) {
+  }
+}
+
 bool simulator_is_missing(const profiles::BenchConfig& config) {
   if (!config.simulation || config.simulation->in_process || config.simulation->control.empty()) return false;
   try {

@@ -3,14 +3,34 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daq/bench/bench.hpp"
+#include "daq/live/live_session.hpp"
+#include "daq/run/steering.hpp"
+#include "daq/run/terminal.hpp"
 
 namespace kphi::commands {
 
 /// A live line can be rewritten on stderr.
 [[nodiscard]] bool has_terminal();
+
+/// Keys of the terminal and of the live page.
+class KeysAtTheStand final : public daq::Keys {
+ public:
+  /// `suspends`: Ctrl-Z stops the program right here, since nothing can turn.
+  KeysAtTheStand(daq::Terminal& terminal, daq::live::LiveSession& view, bool suspends)
+      : terminal_(terminal), view_(view), suspends_(suspends) {}
+  void begin() override { (void)terminal_.begin_keys(); }
+  [[nodiscard]] std::optional<daq::Key> next() override;
+  void forget(const std::function<void()>& poll) override;
+
+ private:
+  daq::Terminal& terminal_;
+  daq::live::LiveSession& view_;
+  const bool suspends_;
+};
 
 /// A simulated bench of `kphi sim` that does not run.
 [[nodiscard]] bool simulator_is_missing(const profiles::BenchConfig& config);

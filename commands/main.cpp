@@ -55,7 +55,14 @@ ExitCode complain(const std::exception& error, ExitCode exit_code) {
 }
 
 ExitCode complain(const kphi::daq::RunStopped& stop) {
-  print_message(stop.words().text(stop.exit_code() == ExitCode::safety_stop ? "SAFETY STOP" : "STOPPED"));
+  using kphi::daq::SignalWatch;
+  const bool suspends = SignalWatch::is_suspension_asked();
+  print_message(stop.words().text(stop.exit_code() == ExitCode::safety_stop ? "SAFETY STOP" : "STOPPED") +
+                (suspends ? "  Ctrl-Z: everything is closed; fg only ends kphi\n" : ""));
+  if (suspends) {
+    (void)kphi::daq::console().finish(kphi::daq::Console::kGiveUp);
+    SignalWatch::suspend();
+  }
   return stop.exit_code();
 }
 
@@ -88,6 +95,7 @@ ExitCode run(int argc, char** argv) {
   program.require_subcommand(1);
   ExitCode exit_code = ExitCode::ok;
   for (kphi::commands::AddVerb* add : kphi::commands::kVerbs) add(program, exit_code);
+  kphi::commands::require_finite_numbers(program);
   program.footer(kFooter);  // a verb added later would repeat it
 
   const std::vector<std::string> typed = kphi::commands::understood(argc, argv);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 
 #include "profiles/schema.hpp"
 
@@ -47,6 +49,19 @@ std::string what_is_wrong(const CLI::App& verb, const CLI::ParseError& error, co
 }
 
 }  // namespace
+
+void require_finite_numbers(CLI::App& program) {
+  for (CLI::Option* option : program.get_options()) {
+    if (option->get_items_expected_max() == 0) continue;
+    option->check([](const std::string& text) {
+      char* end = nullptr;
+      const double value = std::strtod(text.c_str(), &end);
+      const bool is_number = !text.empty() && end == text.c_str() + text.size();
+      return is_number && !std::isfinite(value) ? text + " is not a finite number" : std::string();
+    });
+  }
+  for (CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) require_finite_numbers(*verb);
+}
 
 std::vector<std::string> understood(int argc, const char* const* argv) {
   std::vector<std::string> typed(argv + std::min(argc, 1), argv + argc);

@@ -11,6 +11,10 @@ namespace kphi::commands {
 /// `--help`, `-v` as `--version`.
 [[nodiscard]] std::vector<std::string> understood(int argc, const char* const* argv);
 
+/// No option or argument of `program` and its verbs takes a number that is not finite: NaN is within every range. A
+/// file of such a name is ./nan.
+void require_finite_numbers(CLI::App& program);
+
 /// Two lines for a command line that `program` could not parse: "kphi run: unknown option \"--dryrun\"; did you mean
 /// --dry-run?".
 [[nodiscard]] std::string explain(const CLI::App& program, const CLI::ParseError& error,

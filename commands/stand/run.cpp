@@ -41,7 +41,7 @@ struct RunOptions {
 };
 
 std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<profiles::Answers>& answers,
-                                 const profiles::BenchConfig& config, const std::function<bool()>& stop_asked) {
+                                 const profiles::BenchConfig& config, Terminal& terminal, const StopAsked& stop_asked) {
   if (answers) return std::make_unique<AnsweringOperator>(*answers);
   if (options.yes) return std::make_unique<AutoConfirmOperator>(config.simulation.has_value());
   if (!isatty(STDIN_FILENO)) {
@@ -49,7 +49,7 @@ std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<
         "kphi run: cannot ask for the mountings: standard input is not a terminal; name a file "
         "with the answers (--answers FILE), or use --yes if the bench mounts by itself");
   }
-  return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
+  return std::make_unique<TerminalOperator>(terminal, stderr, stop_asked);
 }
 
 void summarise(const CampaignResult& result, const std::string& folder, bool json) {
@@ -191,8 +191,10 @@ ExitCode run(const RunOptions& options) {
   announce(request, dry);
   live::LiveSession view(options.live, live::subject_of(campaign, config));
   put(stderr, live_greeting(view));
-  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
-  const auto operator_ = person(options, answers, config, stop_asked);
+  const StopAsked end_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  const StopAsked stop_asked = [&] { return end_asked() || SignalWatch::is_suspension_asked(); };
+  Terminal terminal(STDIN_FILENO, stderr);
+  const auto operator_ = person(options, answers, config, terminal, end_asked);
   clear_safety_stop(destination, *operator_, answers);
   const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
   summarise(result, destination.folder->path().string(), options.json);

@@ -12,7 +12,6 @@
 #include "daq/audit/bench_audit.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
-#include "daq/spin/keyboard.hpp"
 #include "results/reduction/reduction.hpp"
 
 namespace kphi::commands {
@@ -66,18 +65,22 @@ HandControl::Settings speeds_of(const SpinOptions& options, RadPerSec top, const
   return speeds;
 }
 
-void require_somebody(const SpinOptions& options) {
-  if (isatty(STDIN_FILENO) || options.live.port || options.for_s) return;
+void require_somebody(const SpinOptions& options, const Terminal& terminal) {
+  if (options.live.port || options.for_s) return;
+  if (!terminal.is_in_foreground())
+    throw ConfigurationError(
+        "spin: nobody can press a key: kphi runs in the background, where keys go to the shell; start it without &");
+  if (isatty(STDIN_FILENO)) return;
   throw ConfigurationError(
       "spin: nobody can press a key: standard input is not a terminal; give --for SECONDS, or --live for a page");
 }
 
-std::unique_ptr<Operator> person_of(const SpinOptions& options, const std::function<bool()>& stop_asked) {
+std::unique_ptr<Operator> person_of(const SpinOptions& options, Terminal& terminal, const StopAsked& stop_asked) {
   if (options.yes) return std::make_unique<AutoConfirmOperator>();
   if (!isatty(STDIN_FILENO))
     throw ConfigurationError(
         "spin: cannot ask whether the stand is clear: standard input is not a terminal; --yes says that it is");
-  return std::make_unique<TerminalOperator>(STDIN_FILENO, stderr, stop_asked);
+  return std::make_unique<TerminalOperator>(terminal, stderr, stop_asked);
 }
 
 std::filesystem::path file_of(const SpinOptions& options, const Bench& bench) {
@@ -116,15 +119,17 @@ ExitCode spin(const SpinOptions& options) {
     throw ConfigurationError("spin: give either --rpm or --percent");
   const profiles::BenchConfig config = profiles::load_bench(options.bench);
   const profiles::Campaign campaign = campaign_of(options, config);
-  require_somebody(options);
+  Terminal terminal(STDIN_FILENO, stderr);
+  require_somebody(options, terminal);
   const SignalWatch signals;
   const RadPerSec top = highest(campaign, config);
   live::Subject subject = live::subject_of(campaign, config);
   subject.by_hand = true;
   subject.speed_max_rpm = to_rpm(top);
   live::LiveSession view(options.live, subject);
-  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
-  const auto person = person_of(options, stop_asked);
+  const StopAsked end_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  const StopAsked stop_asked = [&] { return end_asked() || SignalWatch::is_suspension_asked(); };
+  const auto person = person_of(options, terminal, end_asked);
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
   if (!options.campaign.empty()) bench->mounted(campaign.propeller.id, 0);
@@ -137,17 +142,12 @@ ExitCode spin(const SpinOptions& options) {
                   speeds.lasts ? "" : fmt::format("; without a key it stops after {:g} s", options.dead_man_s)));
   PrintedProgress printed(stderr, has_terminal(), &describe_by_hand);
   const auto progress = view.beside(printed, bench->clock());
-  std::optional<Keyboard> keys;
-  const auto next_key = [&]() -> std::optional<Key> {
-    if (!keys) keys.emplace(STDIN_FILENO);  // once the question has been answered; it forgets what was typed before
-    if (const auto key = keys->next()) return key;
-    return view.take_key();
-  };
+  KeysAtTheStand keys(terminal, view, false);
   const SpinResult result = view.tell_the_end([&] {
     return spin_by_hand(
-        {*bench, campaign, config, *person, *progress, stop_asked, speeds, next_key, file_of(options, *bench)});
+        {*bench, campaign, config, *person, *progress, stop_asked, speeds, keys, file_of(options, *bench)});
   });
-  keys.reset();
+  terminal.end_keys();
   summarise(result, config, options.json);
   return ExitCode::ok;
 }

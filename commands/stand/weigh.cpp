@@ -11,7 +11,6 @@
 #include "commands/inputs.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
-#include "daq/spin/keyboard.hpp"
 #include "results/file_layer.hpp"
 #include "results/version.hpp"
 
@@ -141,16 +140,13 @@ ExitCode weigh(const WeighOptions& options) {
   put(stderr, live_greeting(view));
   PrintedProgress printed(stderr, has_terminal(), &describe_weighing);
   const auto progress = view.beside(printed, bench->clock());
-  std::optional<Keyboard> keys;
-  if (!options.yes) keys.emplace(STDIN_FILENO);
-  const auto next_key = [&]() -> std::optional<Key> {
-    if (const auto key = keys->next()) return key;
-    return view.take_key();
-  };
+  Terminal terminal(STDIN_FILENO, stderr);
+  KeysAtTheStand keys(terminal, view, true);
+  if (!options.yes) keys.begin();
   const Weigh order{*bench,
                     *progress,
                     stop_asked,
-                    options.yes ? std::function<std::optional<Key>()>() : next_key,
+                    options.yes ? nullptr : &keys,
                     order_of(options, config),
                     options.times,
                     from_seconds(options.seconds)};

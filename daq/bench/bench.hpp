@@ -14,6 +14,7 @@
 #include "base/finding.hpp"
 #include "base/thread.hpp"
 #include "compensation/units.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "drivers/ambient/air.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
@@ -55,16 +56,17 @@ class SupplyLink {
 
  private:
   friend class OutputEnable;
-  /// Sets and verifies the limits, then switches the output on; returns once the voltage is there. Throws DeviceError.
-  virtual void switch_on() = 0;
+  /// Sets and verifies the limits, then switches the output on; returns once the voltage is there. Throws DeviceError,
+  /// Interrupted.
+  virtual void switch_on(const StopAsked& stop_asked) = 0;
 };
 
 /// The motor has power while this lives.
 class [[nodiscard]] OutputEnable {
  public:
-  explicit OutputEnable(SupplyLink& supply) : supply_(supply) {
+  OutputEnable(SupplyLink& supply, const StopAsked& stop_asked) : supply_(supply) {
     try {
-      supply_.switch_on();
+      supply_.switch_on(stop_asked);
     } catch (...) {
       (void)supply_.switch_off();
       throw;
@@ -91,8 +93,8 @@ class MotorLink {
   virtual void emergency_stop() noexcept = 0;
   /// Coasts and closes the link, before its power is cut. Until wake() only calls of the guard's thread may follow.
   virtual void rest() {}
-  /// Connects again, to the same module. Throws DeviceError.
-  virtual void wake() {}
+  /// Connects again, to the same module. Throws DeviceError, Interrupted.
+  virtual void wake(const StopAsked&) {}
   /// Ramps down, coasts and watches until the rotor is at rest; returns at once. Ignored while another stop is under
   /// way.
   virtual void begin_stop(const iq::StopSettings& settings) = 0;
@@ -180,8 +182,8 @@ class Bench {
   /// motor must be at rest. False: the motor still has power. Throws SafetyStop.
   [[nodiscard]] virtual bool switch_off_power() = 0;
   /// After everybody has stepped back: restores the power, and connects to the module again if it was lost. Throws
-  /// DeviceError, SafetyStop.
-  virtual void restore_power() = 0;
+  /// DeviceError, SafetyStop, Interrupted.
+  virtual void restore_power(const StopAsked& stop_asked) = 0;
   /// Keeps this computer awake while the handle lives; `why_not` becomes one line if that is impossible.
   [[nodiscard]] virtual std::shared_ptr<void> keep_awake(std::string& why_not) {
     why_not.clear();

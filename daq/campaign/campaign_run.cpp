@@ -62,7 +62,11 @@ class CampaignRun {
         journal_(folder.journal(), bench.files()),
         review_(campaign, progress, [this](const char* event, const json& data) { note(event, data); }),
         planned_(static_cast<int>(plan_.runs.size())) {
-    person.log_to([this](const char* event, const std::string& words) { note(event, {{"words", words}}); });
+    person.log_to([this](const char* event, const std::string& words, const std::optional<Duration>& took) {
+      json data{{"words", words}};
+      if (took) data["after_s"] = to_seconds(*took);
+      note(event, data);
+    });
   }
   ~CampaignRun() {
     person_.log_to({});
@@ -306,7 +310,7 @@ class CampaignRun {
     mounted_.reset();
     const MountConfirmation confirmed = let_mount(occlusion_deg);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
-    bench_.restore_power();
+    bench_.restore_power(stop_asked_);
     mounted_ = confirmed;
     note("mounted",
          {{"propeller", campaign_.propeller.id}, {"occlusion_deg", occlusion_deg}, {"confirmed_by", person_.name()}});

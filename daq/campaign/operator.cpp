@@ -1,53 +1,43 @@
 #include "daq/campaign/operator.hpp"
 
 #include <fmt/format.h>
-#include <poll.h>
-#include <unistd.h>
-
-#include <cerrno>
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "daq/run/console.hpp"
 
 namespace kphi::daq {
 namespace {
 
-constexpr int kPollMs = 20;
-
 [[noreturn]] void refuse(const profiles::Answers& answers, const profiles::Mark& mark, const std::string& what) {
   throw ConfigurationError(answers.place(mark) + ": " + what);
 }
 
-}  // namespace
-
-std::optional<std::string> TerminalOperator::read_line() {
-  std::string line;
-  for (;;) {
-    pollfd waiting{input_, POLLIN, 0};
-    const int ready = ::poll(&waiting, 1, kPollMs);
-    if (stop_asked_()) throw Interrupted("stopped at the prompt");
-    poll();
-    if (ready <= 0) continue;
-    char c = 0;
-    const ssize_t n = read(input_, &c, 1);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return std::nullopt;
-    if (c == '\n') return line;
-    if (c != '\r') line += c;
-  }
+/// "Go " is "go".
+std::string understood(const std::string& typed) {
+  const auto first = typed.find_first_not_of(" \t"), last = typed.find_last_not_of(" \t");
+  std::string answer = first == std::string::npos ? "" : typed.substr(first, last - first + 1);
+  for (char& c : answer)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return answer;
 }
+
+}  // namespace
 
 void TerminalOperator::ask(std::string about, const std::string& question, const std::string& retort,
                            const std::function<bool(const std::string& answer)>& accept) {
+  const auto poll_all = [this] {
+    if (stop_asked_()) throw Interrupted("stopped at the prompt");
+    poll();
+  };
   for (;; about.clear()) {
-    put(words_, (about.empty() ? "" : fmt::format("\n{}\n", about)) + question + " ");
-    asked(about.empty() ? question : about + " " + question);
-    const std::optional<std::string> line = read_line();
-    answered(line.value_or("(no more input)"));
-    const std::string answer = line.value_or("q");
-    if (accept(answer)) return;
-    put(words_, fmt::format(fmt::runtime(retort), answer));
+    if (!about.empty()) put(words_, fmt::format("\n{}\n", about));
+    const auto [line, took] = terminal_.ask(
+        question, [&] { asked(about.empty() ? question : about + " " + question); }, poll_all);
+    answered(line.value_or("(no more input)"), took);
+    if (accept(understood(line.value_or("q")))) return;
+    put(words_, fmt::format(fmt::runtime(retort), printable(line.value_or(""))));
   }
 }
 

@@ -8,6 +8,7 @@
 
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/run_order.hpp"
+#include "daq/run/terminal.hpp"
 #include "profiles/answers.hpp"
 #include "profiles/campaign.hpp"
 
@@ -32,8 +33,9 @@ struct AnotherRun {
 /// The person at the bench. All members are called from the runner's thread, while the motor coasts.
 class Operator {
  public:
-  /// Records each question and each answer, right or wrong, as it comes.
-  using AuditLog = std::function<void(const char* event, const std::string& words)>;
+  /// Records each question and each answer, right or wrong, as it comes; `took`: wall time of a person for an answer.
+  using AuditLog =
+      std::function<void(const char* event, const std::string& words, const std::optional<Duration>& took)>;
 
   virtual ~Operator() = default;
   /// Asks for one mounting and returns once it is confirmed: the only way to unlock the motor. Throws NotMounted.
@@ -69,11 +71,13 @@ class Operator {
     if (poll_) poll_();
   }
   void asked(const std::string& words) { record("operator_asked", words); }
-  void answered(const std::string& words) { record("operator_answered", words); }
+  void answered(const std::string& words, const std::optional<Duration>& took = std::nullopt) {
+    record("operator_answered", words, took);
+  }
 
  private:
-  void record(const char* event, const std::string& words) {
-    if (log_) log_(event, words);
+  void record(const char* event, const std::string& words, const std::optional<Duration>& took = std::nullopt) {
+    if (log_) log_(event, words, took);
   }
   AuditLog log_;
   std::function<void()> poll_;
@@ -98,12 +102,12 @@ class AutoConfirmOperator final : public Operator {
 };
 
 /// Asks on a terminal; the person types the angle that was mounted. Waits without limit; a wrong angle is asked again,
-/// "q" or end of file means no.
+/// "q" or end of file means no. Capitals and blanks around an answer do not matter.
 class TerminalOperator final : public Operator {
  public:
-  /// `stop_asked`: true after a signal.
-  TerminalOperator(int input_descriptor, std::FILE* words, std::function<bool()> stop_asked)
-      : input_(input_descriptor), words_(words), stop_asked_(std::move(stop_asked)) {}
+  /// `stop_asked`: true after a signal. `terminal` outlives this.
+  TerminalOperator(Terminal& terminal, std::FILE* words, std::function<bool()> stop_asked)
+      : terminal_(terminal), words_(words), stop_asked_(std::move(stop_asked)) {}
   [[nodiscard]] bool run_again(const AnotherRun& question) override;
   void clear_safety_stop(const std::string& reason) override;
   [[nodiscard]] std::string name() const override { return "terminal"; }
@@ -117,9 +121,7 @@ class TerminalOperator final : public Operator {
   /// the first time, `retort` ("You typed "{}"…") before it is asked again.
   void ask(std::string about, const std::string& question, const std::string& retort,
            const std::function<bool(const std::string& answer)>& accept);
-  /// nullopt at end of file.
-  std::optional<std::string> read_line();
-  int input_;
+  Terminal& terminal_;
   std::FILE* words_;
   std::function<bool()> stop_asked_;
 };

@@ -103,8 +103,8 @@ std::optional<Trip> check(const SupplyReading& seen, const profiles::SupplyConfi
   return std::nullopt;
 }
 
-MotorPower::MotorPower(SupplyLink* supply)
-    : supply_(supply), on_(supply != nullptr ? std::make_unique<OutputEnable>(*supply) : nullptr) {}
+MotorPower::MotorPower(SupplyLink* supply, const StopAsked& stop_asked)
+    : supply_(supply), on_(supply != nullptr ? std::make_unique<OutputEnable>(*supply, stop_asked) : nullptr) {}
 
 bool MotorPower::off(MotorLink& motor) {
   if (supply_ == nullptr) return false;
@@ -115,13 +115,16 @@ bool MotorPower::off(MotorLink& motor) {
   return true;
 }
 
-void MotorPower::restore(MotorLink& motor, const Clock& clock, const std::function<void()>& wait_for_voltage) {
+void MotorPower::restore(MotorLink& motor, const Clock& clock, const StopAsked& stop_asked,
+                         const std::function<void()>& wait_for_voltage) {
   require_awake(clock);
+  require_no_stop(stop_asked, "before the motor had power");
   if (supply_ != nullptr) {
-    on_ = std::make_unique<OutputEnable>(*supply_);
+    on_ = std::make_unique<OutputEnable>(*supply_, stop_asked);
     wait_for_voltage();
   }
-  if (supply_ != nullptr || !motor.failure().empty()) motor.wake();
+  if (supply_ != nullptr || !motor.failure().empty()) motor.wake(stop_asked);
+  require_no_stop(stop_asked, "before the motor turned");
 }
 
 }  // namespace kphi::daq

@@ -81,12 +81,14 @@ void require_awake(const Clock& clock);
 class MotorPower {
  public:
   /// `supply` outlives this; nullptr: kphi does not control the power. Throws DeviceError.
-  explicit MotorPower(SupplyLink* supply);
+  MotorPower(SupplyLink* supply, const StopAsked& stop_asked);
   /// See Bench::switch_off_power.
   [[nodiscard]] bool off(MotorLink& motor);
-  /// See Bench::restore_power. `wait_for_voltage`: for a supply that does not wait by itself. Throws SafetyStop, too.
+  /// See Bench::restore_power. `wait_for_voltage`: for a supply that does not wait by itself. Throws SafetyStop,
+  /// Interrupted, too.
   void restore(
-      MotorLink& motor, const Clock& clock, const std::function<void()>& wait_for_voltage = [] {});
+      MotorLink& motor, const Clock& clock, const StopAsked& stop_asked,
+      const std::function<void()>& wait_for_voltage = [] {});
 
  private:
   SupplyLink* supply_;

@@ -10,12 +10,18 @@ namespace kphi::daq {
 namespace {
 
 std::atomic<int> g_count{0};
-static_assert(std::atomic<int>::is_always_lock_free);
+std::atomic<bool> g_suspension{false};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
 
-constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP};
 std::array<struct sigaction, kSignals.size()> g_previous{};
 
-void count_signal(int) { g_count.fetch_add(1); }
+void note(int signal) {
+  if (signal == SIGTSTP)
+    g_suspension = true;
+  else
+    g_count.fetch_add(1);
+}
 
 void append(std::string& words, const std::string& text) {
   if (!text.empty()) words += (words.empty() ? "" : "; ") + text;
@@ -46,6 +52,10 @@ std::string StopWords::text(const std::string& headline) const {
   return text;
 }
 
+void require_no_stop(const StopAsked& stop_asked, const char* when) {
+  if (stop_asked()) throw Interrupted(std::string("stopped by request ") + when);
+}
+
 StopWords words_of(const std::exception_ptr& cause) {
   try {
     std::rethrow_exception(cause);
@@ -60,8 +70,9 @@ StopWords words_of(const std::exception_ptr& cause) {
 
 SignalWatch::SignalWatch() {
   g_count = 0;
+  g_suspension = false;
   struct sigaction action {};
-  action.sa_handler = count_signal;
+  action.sa_handler = note;
   sigemptyset(&action.sa_mask);
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &action, &g_previous[i]);
 }
@@ -71,5 +82,20 @@ SignalWatch::~SignalWatch() {
 }
 
 int SignalWatch::count() noexcept { return g_count.load(); }
+
+bool SignalWatch::is_suspension_asked() noexcept { return g_suspension.load(); }
+
+bool SignalWatch::take_suspension() noexcept { return g_suspension.exchange(false); }
+
+void SignalWatch::suspend() noexcept {
+  struct sigaction by_default {
+  }, before{};
+  by_default.sa_handler = SIG_DFL;
+  sigemptyset(&by_default.sa_mask);
+  sigaction(SIGTSTP, &by_default, &before);
+  ::raise(SIGTSTP);
+  sigaction(SIGTSTP, &before, nullptr);
+  g_suspension = false;
+}
 
 }  // namespace kphi::daq

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -52,6 +53,12 @@ class Interrupted : public RunStopped {
   explicit Interrupted(const std::string& cause) : Interrupted(StopWords{.cause = cause}) {}
 };
 
+/// Whether a person or the system asks the program to stop. The runner's thread asks after each wait, and before
+/// anything is switched on.
+using StopAsked = std::function<bool()>;
+/// Throws Interrupted if so. `when`: "before anything was switched on".
+void require_no_stop(const StopAsked& stop_asked, const char* when);
+
 /// Words of any exception; an exception other than RunStopped has only a cause, its message.
 [[nodiscard]] StopWords words_of(const std::exception_ptr& cause);
 
@@ -67,8 +74,8 @@ template <class Expected>
   }
 }
 
-/// While it lives, SIGINT, SIGTERM, SIGHUP and SIGQUIT are only counted; the runner checks the count on every tick.
-/// Afterwards they act as before.
+/// While it lives, SIGINT, SIGTERM, SIGHUP and SIGQUIT are only counted, and Ctrl-Z is only noted; the runner checks
+/// both on every tick. Afterwards they act as before.
 class SignalWatch {
  public:
   SignalWatch();
@@ -77,6 +84,12 @@ class SignalWatch {
   SignalWatch& operator=(const SignalWatch&) = delete;
   /// How many arrived. Any thread.
   [[nodiscard]] static int count() noexcept;
+  /// Ctrl-Z, which must wait until nothing can turn. Any thread.
+  [[nodiscard]] static bool is_suspension_asked() noexcept;
+  /// True: it was asked for, and the caller suspends.
+  [[nodiscard]] static bool take_suspension() noexcept;
+  /// Stops this program as Ctrl-Z does; returns once it continues. At once where no shell controls jobs.
+  static void suspend() noexcept;
 };
 
 }  // namespace kphi::daq

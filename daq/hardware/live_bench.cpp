@@ -31,6 +31,8 @@ constexpr Duration kDrainWall = std::chrono::milliseconds(5);
 constexpr std::chrono::seconds kCalinfoTimeout{1};
 constexpr std::chrono::seconds kPageTimeout{5};
 constexpr std::chrono::seconds kBootTime{5};  // of the module, after its power came back
+constexpr const char* kBeforePower = "before anything was switched on";
+constexpr const char* kWhileConnecting = "before anything turned";
 constexpr Duration kSyncWall = std::chrono::milliseconds(500);
 
 iq::Settings motor_settings(const profiles::MotorConfig& config) {
@@ -71,10 +73,6 @@ std::filesystem::path settings_journal(const profiles::NetBoxConfig& config) {
 
 std::string page_of(const profiles::NetBoxConfig& config, const std::string& target) {
   return netbox::http_get({config.host, config.bind}, config.http_port, target, kPageTimeout);
-}
-
-void require_no_stop(const std::function<bool()>& stop_asked) {
-  if (stop_asked()) throw Interrupted("stopped by request before anything was switched on");
 }
 
 /// The box first: it is quick.
@@ -122,17 +120,26 @@ class PeriodicThread {
 
 }  // namespace
 
-LiveMotor::LiveMotor(const profiles::MotorConfig& config, const Clock& clock)
-    : config_(config), clock_(clock), motor_(connect()), identity_(motor_->identity().summary()) {
+LiveMotor::LiveMotor(const profiles::MotorConfig& config, const Clock& clock, const StopAsked& stop_asked)
+    : config_(config), clock_(clock), motor_(connect(stop_asked)), identity_(motor_->identity().summary()) {
   const bool newer = motor_->identity().value<"coil_temperature_estimator.t_coil">().has_value();
-  parameters_ = iq::read_audit([this](auto asked) { return motor_->inquire(std::move(asked)); }, newer);
+  const auto ask = [&](auto asked) {
+    require_no_stop(stop_asked, kWhileConnecting);
+    return motor_->inquire(std::move(asked));
+  };
+  parameters_ = iq::read_audit(ask, newer);
 }
 
-std::shared_ptr<iq::Motor> LiveMotor::connect() const {
-  auto motor =
-      std::make_shared<iq::Motor>(config_.device, config_.baud, motor_settings(config_), clock_, config_.capture);
-  (void)motor->take_events();  // that it is connected
-  return motor;
+std::shared_ptr<iq::Motor> LiveMotor::connect(const StopAsked& stop_asked) const {
+  try {
+    auto motor = std::make_shared<iq::Motor>(config_.device, config_.baud, motor_settings(config_), clock_,
+                                             config_.capture, stop_asked);
+    (void)motor->take_events();  // that it is connected
+    return motor;
+  } catch (const DeviceError&) {
+    require_no_stop(stop_asked, kWhileConnecting);
+    throw;
+  }
 }
 
 std::shared_ptr<iq::Motor> LiveMotor::connected() const {
@@ -140,12 +147,12 @@ std::shared_ptr<iq::Motor> LiveMotor::connected() const {
   throw DeviceError("motor module on " + config_.device, "spin", "the module has no power");
 }
 
-void LiveMotor::wake() {
+void LiveMotor::wake(const StopAsked& stop_asked) {
   rest();
   const auto give_up = std::chrono::steady_clock::now() + kBootTime;
   for (std::shared_ptr<iq::Motor> found; !found;) {
     try {
-      found = connect();
+      found = connect(stop_asked);
     } catch (const DeviceError&) {
       if (std::chrono::steady_clock::now() > give_up) throw;
       std::this_thread::sleep_for(kDrainWall);  // it may still be booting
@@ -220,7 +227,7 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
     findings_.push_back(std::move(*finding));
   }
   SlotPages slots = read_slot_pages([&](const std::string& target) {
-    require_no_stop(stop_asked);
+    require_no_stop(stop_asked, kBeforePower);
     return page_of(config_, target);
   });
   slots_json_ = std::move(slots.json);
@@ -259,11 +266,14 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
                                   : std::make_unique<LiveLoadCell>(config.netbox, clock_, stop_asked)),
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
       sentinel_(last_words(config, supply_.get())),
-      power_(supply_to_switch_on(stop_asked)),
-      motor_(config.motor ? connect_motor(config, clock_) : std::make_unique<LiveMotor>(config.iq, clock_)) {}
+      power_(supply_to_switch_on(stop_asked), stop_asked),
+      motor_(config.motor ? connect_motor(config, clock_)
+                          : std::make_unique<LiveMotor>(config.iq, clock_, stop_asked)) {
+  require_no_stop(stop_asked, kWhileConnecting);
+}
 
 SupplyLink* LiveBench::supply_to_switch_on(const std::function<bool()>& stop_asked) {
-  require_no_stop(stop_asked);
+  require_no_stop(stop_asked, kBeforePower);
   require_awake(clock_);
   return supply_.get();
 }

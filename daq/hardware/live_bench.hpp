@@ -21,10 +21,10 @@ namespace kphi::daq {
 
 class LiveMotor final : public MotorLink {
  public:
-  /// Connects and reads the module's parameters. Throws DeviceError.
-  LiveMotor(const profiles::MotorConfig& config, const Clock& clock);
+  /// Connects and reads the module's parameters. Throws DeviceError, Interrupted.
+  LiveMotor(const profiles::MotorConfig& config, const Clock& clock, const StopAsked& stop_asked);
   void rest() override { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
-  void wake() override;
+  void wake(const StopAsked& stop_asked) override;
   void spin_at(RadPerSec signed_speed) override { connected()->spin_at(signed_speed); }
   void renew() noexcept override;
   void emergency_stop() noexcept override;
@@ -41,7 +41,7 @@ class LiveMotor final : public MotorLink {
  private:
   [[nodiscard]] std::shared_ptr<iq::Motor> motor() const noexcept { return std::atomic_load(&motor_); }
   [[nodiscard]] std::shared_ptr<iq::Motor> connected() const;
-  [[nodiscard]] std::shared_ptr<iq::Motor> connect() const;
+  [[nodiscard]] std::shared_ptr<iq::Motor> connect(const StopAsked& stop_asked) const;
 
   const profiles::MotorConfig config_;
   const Clock& clock_;
@@ -97,7 +97,7 @@ class LiveBench final : public Bench {
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   void hung(int axis, double newtons) override;
   [[nodiscard]] bool switch_off_power() override { return power_.off(*motor_); }
-  void restore_power() override { power_.restore(*motor_, clock_); }
+  void restore_power(const StopAsked& stop_asked) override { power_.restore(*motor_, clock_, stop_asked); }
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
   [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string& why_not) override;
 

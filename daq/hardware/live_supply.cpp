@@ -42,15 +42,17 @@ LiveSupply::LiveSupply(const profiles::SupplyConfig& config, const Clock& clock)
 
 std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 
-void LiveSupply::switch_on() {
+void LiveSupply::switch_on(const StopAsked& stop_asked) {
   configured("supply", [&] {
     worker_.apply({config_.voltage, config_.current_limit, config_.over_voltage, config_.over_current});
   });
+  require_no_stop(stop_asked, "before the supply was switched on");
   worker_.switch_on();
   const auto give_up = std::chrono::steady_clock::now() + kRise;
   const double enough = (1 - results::kSupplySag) * config_.voltage.value();
   for (std::optional<SupplyReading> seen;; std::this_thread::sleep_for(kAsk)) {
     seen = worker_.newest();
+    require_no_stop(stop_asked, "while the supply was switched on");
     if (seen && seen->output && seen->voltage_v >= enough) return;
     if (!worker_.alive()) throw DeviceError(worker_.identity().device, "switch on", worker_.failure());
     if (std::chrono::steady_clock::now() < give_up) continue;

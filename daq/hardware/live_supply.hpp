@@ -22,7 +22,7 @@ class LiveSupply final : public SupplyLink {
   [[nodiscard]] std::string switch_off() noexcept override;
 
  private:
-  void switch_on() override;
+  void switch_on(const StopAsked& stop_asked) override;
 
   const profiles::SupplyConfig config_;
   supply::Worker worker_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -11,6 +12,19 @@
 namespace kphi::daq {
 
 enum class Key : std::uint8_t { up, down, hold, stop };
+
+/// Keys of whoever is there. The runner's thread.
+class Keys {
+ public:
+  virtual ~Keys() = default;
+  /// From now on keys count, also those pressed since the last answer.
+  virtual void begin() {}
+  /// The oldest that was pressed; does not wait.
+  [[nodiscard]] virtual std::optional<Key> next() = 0;
+  /// Once all words are on the screen, no key counts that was pressed before: the next one answers them. `poll` is
+  /// called while it waits, and ends the wait by an exception.
+  virtual void forget(const std::function<void()>& poll) = 0;
+};
 
 /// The runner's thread.
 class Steering {

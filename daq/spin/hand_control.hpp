@@ -2,8 +2,6 @@
 // key for a while it stops, unless a time was set before.
 #pragma once
 
-#include <functional>
-
 #include "daq/run/steering.hpp"
 
 namespace kphi::daq {
@@ -17,25 +15,25 @@ class HandControl final : public Steering {
     std::optional<Duration> lasts{};               ///< bench time from the first moment at `start`; then it stops
     Duration dead_man = std::chrono::seconds(30);  ///< bench time without a key; where nothing is set in `lasts`
   };
-  /// `next_key`: the oldest that was pressed since; nullopt: none.
-  HandControl(const Settings& settings, std::function<std::optional<Key>()> next_key)
-      : settings_(settings), next_key_(std::move(next_key)), target_(settings.start) {}
-
-  /// What was pressed until now does not count. From now on it does, also before the motor turns: stop keeps it at
-  /// rest.
-  void forget_keys() {
-    while (next_key_()) {
-    }
+  /// Keys count from now on, also before the motor turns: stop keeps it at rest. `keys` outlives this.
+  HandControl(const Settings& settings, Keys& keys) : settings_(settings), keys_(keys), target_(settings.start) {
+    keys_.begin();
   }
+
+  /// Somebody pressed stop before a speed was wanted for the first time. To be asked until then.
+  [[nodiscard]] bool is_called_off();
   [[nodiscard]] std::optional<RadPerSec> wanted(Instant now, RadPerSec commanded) override;
   [[nodiscard]] std::string why() const override { return why_; }
 
  private:
-  void take(Key key, RadPerSec commanded);
+  /// True: there were some.
+  bool take_keys();
+  void take(Key key);
 
   const Settings settings_;
-  const std::function<std::optional<Key>()> next_key_;
-  RadPerSec target_;
+  Keys& keys_;
+  RadPerSec target_;  ///< a key moves it by at most one step beyond what is commanded
+  RadPerSec commanded_{0};
   std::optional<Instant> newest_key_;  ///< or the first call
   std::optional<Instant> reached_;     ///< `start`
   std::string why_;

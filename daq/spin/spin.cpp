@@ -64,9 +64,9 @@ SpinResult spin_by_hand(const Spin& spin) {
   const MountConfirmation clear = ask_at_the_stand(
       spin.bench, spin.person, spin.stop_asked,
       [&](const std::string& condition) { return spin.person.confirm_clear(to_rpm(spin.speeds.start), condition); });
-  spin.bench.restore_power();
-  HandControl steering(spin.speeds, spin.next_key);
-  steering.forget_keys();
+  HandControl steering(spin.speeds, spin.keys);
+  const StopAsked stop_asked = [&] { return spin.stop_asked() || steering.is_called_off(); };
+  spin.bench.restore_power(stop_asked);
   profiles::PlannedRun planned;
   planned.mount = false;
   const double lasts_s = spin.speeds.lasts ? to_seconds(*spin.speeds.lasts) : 0;
@@ -75,7 +75,7 @@ SpinResult spin_by_hand(const Spin& spin) {
   std::string awake_not, prompt_not;
   const auto awake = kept(spin.bench.keep_awake(awake_not), awake_not, watched);
   (void)kept(spin.bench.keep_prompt(prompt_not), prompt_not, watched);  // only to tell a refusal
-  RunResult run = record_run(spin.bench, order, watched, spin.stop_asked);
+  RunResult run = record_run(spin.bench, order, watched, stop_asked);
   std::vector<results::StepMean> held = results::reduce(results::read_run(run.file));
   std::erase_if(held, [](const results::StepMean& step) { return !std::isfinite(step.thrust_n); });
   return {std::move(run), std::move(held)};

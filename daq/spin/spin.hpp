@@ -26,7 +26,7 @@ struct Spin {
   Progress& progress;
   const std::function<bool()>& stop_asked;
   HandControl::Settings speeds;
-  std::function<std::optional<Key>()> next_key;
+  Keys& keys;
   std::filesystem::path file;
 };
 
@@ -36,6 +36,7 @@ struct SpinResult {
 };
 
 /// Asks whether the stand is clear, then turns the motor until the time is over, a key or nobody at the keys says stop.
+/// From the answer on a stop key counts: before the motor turns it ends this as Interrupted.
 /// Throws as record_run.
 [[nodiscard]] SpinResult spin_by_hand(const Spin& spin);
 

@@ -92,7 +92,7 @@ void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
   next_work_ = {};
   sim_.emplace(settings);
   if (config_.supply) supply_.emplace(*config_.supply, *sim_->supply(), clock_);
-  power_.emplace(supply());
+  power_.emplace(supply(), [] { return false; });
   motor_.emplace(config_.iq, sim_->motor_line(), clock_, [this] { step_to(clock_.now() + kMotorWait); });
   if (supply_) {
     clock_.set(clock_.now() + kSupplyRises);
@@ -227,8 +227,8 @@ std::shared_ptr<void> DeterministicBench::run_periodically(const ThreadRole&, st
   return {nullptr, [this, entry](void*) { work_.erase(entry); }};
 }
 
-void DeterministicBench::restore_power() {
-  power_->restore(*motor_, clock_, [this] { wait_until(clock_.now() + kSupplyRises); });
+void DeterministicBench::restore_power(const StopAsked& stop_asked) {
+  power_->restore(*motor_, clock_, stop_asked, [this] { wait_until(clock_.now() + kSupplyRises); });
 }
 
 void DeterministicBench::mounted(const std::string& propeller_id, double occlusion_deg) {

@@ -62,7 +62,7 @@ class DeterministicBench final : public Bench, private LoadCellLink {
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   void hung(int axis, double newtons) override;
   [[nodiscard]] bool switch_off_power() override { return power_->off(*motor_); }
-  void restore_power() override;
+  void restore_power(const StopAsked& stop_asked) override;
 
   /// What a fault test looks at, and where it puts its finger.
   [[nodiscard]] sim::SimulatedBench& simulation() noexcept { return *sim_; }

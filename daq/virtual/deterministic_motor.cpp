@@ -34,7 +34,7 @@ void DeterministicMotor::connect() {
   (void)session_.take_events();  // that it is connected
 }
 
-void DeterministicMotor::wake() {
+void DeterministicMotor::wake(const StopAsked&) {
   resting_ = false;
   const Instant give_up = clock_.now() + kWakes;
   do {

@@ -22,7 +22,7 @@ class DeterministicMotor final : public MotorLink {
   void connect();
   /// kphi sends nothing until wake().
   void rest() noexcept override { resting_ = true; }
-  void wake() override;
+  void wake(const StopAsked&) override;
   /// Carries bytes both ways, at the clock's time.
   void exchange();
   void advance(Instant now) {

@@ -15,7 +15,7 @@ constexpr int kAttempts = 3;
 
 }  // namespace
 
-void DeterministicSupply::switch_on() {
+void DeterministicSupply::switch_on(const StopAsked&) {
   if (!slave_.answers(clock_.now()))
     throw DeviceError("simulated supply", "switch on", "no answer", "check that it is on and its baud rate");
   circuit_.controls() = {config_.voltage.value(), config_.current_limit.value(), config_.over_voltage.value(),

@@ -28,7 +28,7 @@ class DeterministicSupply final : public SupplyLink {
   void look();
 
  private:
-  void switch_on() override;
+  void switch_on(const StopAsked& stop_asked) override;
   [[nodiscard]] SupplyReading shown(Duration wait) const;
   void miss();
 

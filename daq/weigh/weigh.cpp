@@ -70,20 +70,21 @@ class Procedure {
         result_.levels.push_back(level);
         return;
       }
-      if (!order_.next_key) throw DataRejected("weigh: " + doubt);
+      if (order_.keys == nullptr) throw DataRejected("weigh: " + doubt);
       order_.progress.say(doubt);
     }
   }
 
   void ask(bool loaded) {
-    if (!order_.next_key) return;
+    if (order_.keys == nullptr) return;
     position_.phase = loaded ? kPutOn : kTakeOff;
     order_.progress.say(
         loaded ? fmt::format("Put {:g} kg on, so that it pulls along {}; then press Enter.", result_.mass_kg, name())
                : "Take everything off; then press Enter.");
+    order_.keys->forget([this] { tick(); });
     for (;;) {
       tick();
-      const std::optional<Key> key = order_.next_key();
+      const std::optional<Key> key = order_.keys->next();
       if (key == Key::hold) return;
       if (key == Key::stop) throw Interrupted("stopped by a key");
     }

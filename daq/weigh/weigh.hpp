@@ -21,8 +21,8 @@ struct Weigh {
   Bench& bench;
   Progress& progress;
   const std::function<bool()>& stop_asked;
-  /// hold: the mass is as was asked for; stop: no more. Empty: nobody is asked, for a simulated bench or a robot.
-  std::function<std::optional<Key>()> next_key;
+  /// hold: the mass is as was asked for; stop: no more. nullptr: nobody is asked, for a simulated bench or a robot.
+  Keys* keys;
   results::Weighing weighing;                  ///< what is known before: bench, mass, gravity, axis
   int times = 3;                               ///< on and off
   Duration stretch = std::chrono::seconds(3);  ///< of samples for one mean

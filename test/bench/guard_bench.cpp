@@ -39,7 +39,7 @@ class CellBench final : public daq::Bench, private daq::LoadCellLink {
   [[nodiscard]] Duration sync_interval() const override { return std::chrono::milliseconds(500); }
   void mounted(const std::string&, double) override {}
   [[nodiscard]] bool switch_off_power() override { return false; }
-  void restore_power() override {}
+  void restore_power(const daq::StopAsked&) override {}
   results::LoadCellScale start() override {
     cell_.start();
     return daq::to_scale(cell_.configuration());

@@ -75,6 +75,18 @@ inline profiles::BenchConfig deterministic_config(int seed, const std::string& f
 /// Nobody asks for a stop.
 inline bool never() { return false; }
 
+/// Keys that a test presses.
+struct PressedKeys final : daq::Keys {
+  explicit PressedKeys(std::function<std::optional<daq::Key>()> pressed) : press(std::move(pressed)) {}
+  [[nodiscard]] std::optional<daq::Key> next() override { return press(); }
+  void forget(const std::function<void()>& poll) override {
+    poll();
+    ++forgotten;
+  }
+  std::function<std::optional<daq::Key>()> press;
+  int forgotten = 0;  ///< times
+};
+
 /// Of the error that the call throws; "": it throws none.
 template <class Error, class Call>
 std::string words_of(Call&& call) {

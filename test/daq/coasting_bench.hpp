@@ -31,7 +31,7 @@ class SpoiltSupply final : public SupplyLink {
   std::string lost;  ///< why the link is dead
 
  private:
-  void switch_on() override {}
+  void switch_on(const StopAsked&) override {}
   SupplyLink& inner_;
   const Clock& clock_;
 };

@@ -38,7 +38,7 @@ class QueueSupply final : public SupplyLink {
   std::string unconfirmed;
 
  private:
-  void switch_on() override {
+  void switch_on(const StopAsked&) override {
     on = true;
     if (refuses) throw std::runtime_error("no");
   }
@@ -51,7 +51,7 @@ class QueueMotor : public MotorLink {
   void renew() noexcept override {}
   void emergency_stop() noexcept override { ++coasted; }
   void rest() override { ++rests; }
-  void wake() override { ++wakes; }
+  void wake(const StopAsked&) override { ++wakes; }
   void begin_stop(const iq::StopSettings&) override {}
   [[nodiscard]] std::optional<iq::StopReport> stop_report() override { return std::nullopt; }
   [[nodiscard]] const iq::AuditRecord& parameters() const override { return parameters_; }
@@ -107,7 +107,7 @@ class QueueBench : public Bench, private LoadCellLink {
   void mounted(const std::string&, double) override {}
   void hung(int, double) override {}
   [[nodiscard]] bool switch_off_power() override { return false; }
-  void restore_power() override {}
+  void restore_power(const StopAsked&) override {}
 
   ManualClock time;
   results::FileLayer* layer = &results::disk();

@@ -19,7 +19,7 @@ class WrappedBench : public Bench {
   [[nodiscard]] results::FileLayer& files() override { return bench.files(); }
   [[nodiscard]] Duration sync_interval() const override { return bench.sync_interval(); }
   [[nodiscard]] bool switch_off_power() override { return bench.switch_off_power(); }
-  void restore_power() override { bench.restore_power(); }
+  void restore_power(const StopAsked& stop_asked) override { bench.restore_power(stop_asked); }
   void mounted(const std::string& propeller, double occlusion) override { bench.mounted(propeller, occlusion); }
   void hung(int axis, double newtons) override { bench.hung(axis, newtons); }
   [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override {

@@ -146,6 +146,21 @@ std::string Process::wait_for(const std::string& text, std::chrono::seconds limi
   }
 }
 
+std::size_t Process::wait_for_prompt(const std::vector<std::string>& texts, std::chrono::seconds limit) {
+  const auto give_up = Clock::now() + limit;
+  for (;;) {
+    std::size_t first = std::string::npos, which = 0;
+    for (std::size_t i = 0; i < texts.size(); ++i)
+      if (const std::size_t at = err_.find(texts[i], prompted_); at < first) first = at, which = i;
+    if (first != std::string::npos) {
+      prompted_ = first + texts[which].size();
+      return which;
+    }
+    if (Clock::now() > give_up || !read_some(std::chrono::milliseconds(100)))
+      throw std::runtime_error("\"" + texts.front() + "\" was not asked" + everything());
+  }
+}
+
 int Process::wait(std::chrono::seconds limit) {
   const auto give_up = Clock::now() + limit;
   while (read_some(std::chrono::milliseconds(50))) {

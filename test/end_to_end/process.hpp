@@ -31,6 +31,10 @@ class Process {
   /// Waits until a whole line that contains `text` came on stdout or stderr; returns it. Throws after `limit`, or when
   /// the process ends without it, with all that was printed.
   std::string wait_for(const std::string& text, std::chrono::seconds limit = std::chrono::seconds(60));
+  /// Waits until one of the texts came on stderr after the one of the last call, whether or not its line has ended;
+  /// which one.
+  std::size_t wait_for_prompt(const std::vector<std::string>& texts = {"to stop: "},
+                              std::chrono::seconds limit = std::chrono::seconds(60));
   void signal(int number) const;
   /// Stops it, and returns when all of it stands still; false: it has ended before.
   [[nodiscard]] bool freeze() const;
@@ -55,6 +59,7 @@ class Process {
   int err_descriptor_ = -1;
   std::string out_;
   std::string err_;
+  std::size_t prompted_ = 0;  ///< of err_: up to there prompts have been waited for
 };
 
 /// The command at a real-time priority of 1 to 99, where this process may grant one: other work of the host then does

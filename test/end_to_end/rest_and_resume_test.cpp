@@ -131,6 +131,7 @@ TEST(SafetyStop, IsClearedOnlyByAPersonsOwnWord) {
   const Terminal terminal;
   Process asked(resume({"--accept-changes"}), {}, {{}, terminal.descriptor()});
   asked.wait_for("A safety stop ended this campaign: thrust ");
+  asked.wait_for_prompt();
   terminal.type("q");
   EXPECT_EQ(asked.wait(), 130) << asked.err();
   EXPECT_EQ(stand.bench.account().last_speed_at() > 0, true) << "of the first run";

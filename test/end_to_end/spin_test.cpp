@@ -41,7 +41,7 @@ TEST_P(SpinAtATerminal, EndsWithTheMotorCoasting) {
   Process spin(in_real_time({kphi(), "spin", "--bench", bench.path("bench.yaml"), "--rpm", "6000", "--dead-man", "4",
                              "--out", bench.path("results")}),
                {}, {{}, terminal.descriptor(), 0});
-  spin.wait_for("Is it tight");
+  spin.wait_for_prompt();
   terminal.type("go");
   ASSERT_TRUE(bench.await_speed(600)) << spin.err();
   const double cause_ms = bench.time_ms();

@@ -27,6 +27,11 @@ int asked(const std::string& words) {
   return questions;
 }
 
+/// Each answer is followed by a measurement, and that by the next question or the result.
+bool answered(const std::string& words, int question) {
+  return asked(words) > question || words.find("gain ") != std::string::npos;
+}
+
 TEST(Weigh, AsksAtATerminalWithoutPowerAndKeepsWhatItFound) {
   RunningBench bench(Manner{.time_scale = 4, .supply = true});
   Terminal terminal;
@@ -35,7 +40,11 @@ TEST(Weigh, AsksAtATerminalWithoutPowerAndKeepsWhatItFound) {
   for (int question = 1; question <= 7; ++question) {
     while (asked(process.err()) < question) ASSERT_TRUE(process.hear(std::chrono::seconds(60))) << process.err();
     EXPECT_EQ(bench.status()["supply"]["output"], false);
-    terminal.press("\n");
+    // What is pressed in the moment in which the question appears may not count yet.
+    while (!answered(process.err(), question)) {
+      terminal.press("\n");
+      ASSERT_TRUE(process.hear(std::chrono::milliseconds(200))) << process.err();
+    }
   }
   EXPECT_EQ(process.wait(), 0) << process.err();
   const auto found = nlohmann::json::parse(process.out());
@@ -49,7 +58,7 @@ TEST(Weigh, StopsAtAnyOtherKeyWithoutAFile) {
   Terminal terminal;
   Process process(weigh(bench.path("bench.yaml"), bench.path("results")), {}, {{}, terminal.descriptor(), 0});
   process.wait_for("Take everything off");
-  terminal.press("x");
+  while (process.hear(std::chrono::milliseconds(200))) terminal.press("x");
   EXPECT_EQ(process.wait(), 130) << process.err();
   EXPECT_FALSE(std::filesystem::exists(bench.path("results")));
   EXPECT_TRUE(bench.account().ends_without_power());

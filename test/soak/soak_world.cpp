@@ -22,7 +22,7 @@ std::string bench_text(const Mixture& mixture) {
 
 }  // namespace
 
-/// What a person types, not always after being asked.
+/// What a person types.
 class Keyboard {
  public:
   Keyboard() {
@@ -89,25 +89,38 @@ class World::Watch final : public daq::Progress {
   World& world_;
 };
 
-/// Types what the mixture says, and may be the last to be asked.
+/// Types a line of what the mixture says whenever a question was asked, and may be the last to be asked.
 class World::Person final : public daq::Operator {
  public:
   Person(World& world, std::function<bool()> stop_asked)
-      : world_(world), asked_(keyboard_.descriptor(), nowhere_.stream, std::move(stop_asked)) {
-    keyboard_.type(world.mixture_.answers);
-    if (world.mixture_.life == 1 || !world.mixture_.answers_are_good) keyboard_.leave();
+      : world_(world),
+        answers_(world.mixture_.answers),
+        terminal_(keyboard_.descriptor(), nowhere_.stream),
+        asked_(terminal_, nowhere_.stream, std::move(stop_asked)) {
+    asked_.log_to([this](const std::string& event, const std::string&, const auto&) {
+      if (event == "operator_asked") type_the_next();
+    });
   }
   void mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string&) override {
     world_.at_prompt();
     if (world_.mixture_.life > 1 && world_.mixture_.answers_are_good)
-      keyboard_.type(std::to_string(std::lround(occlusion_deg)) + "\n");
+      answers_ = std::to_string(std::lround(occlusion_deg)) + "\n";
     (void)asked_.confirm_mounting(propeller, occlusion_deg);
   }
 
  private:
+  void type_the_next() {
+    if (answers_.empty()) return keyboard_.leave();
+    const std::size_t line = std::min(answers_.find('\n'), answers_.size() - 1) + 1;
+    keyboard_.type(answers_.substr(0, line));
+    answers_.erase(0, line);
+  }
+
   World& world_;
+  std::string answers_;  ///< not typed yet
   Keyboard keyboard_;
   Nowhere nowhere_;
+  daq::Terminal terminal_;
   daq::TerminalOperator asked_;
 };
 

@@ -19,6 +19,7 @@ namespace {
 using std::chrono::steady_clock;
 constexpr auto kStopLimit = std::chrono::milliseconds(600);
 constexpr auto kConnectLimit = std::chrono::seconds(10);
+constexpr auto kGiveUpEvery = std::chrono::milliseconds(20);
 constexpr auto kFinalCoastLimit = std::chrono::milliseconds(200);
 constexpr auto kLongestSleep = std::chrono::seconds(1);
 constexpr auto kFirstPause = std::chrono::milliseconds(50);
@@ -46,7 +47,8 @@ Settings stretched(Settings settings, const std::string& device, unsigned baud, 
 class Link {
  public:
   /// Opens the device and connects; throws DeviceError. `capture`: file for all bytes; empty: no capture.
-  Link(Motor& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture)
+  Link(Motor& motor, unsigned baud, const Settings& settings, const Clock& clock, const std::string& capture,
+       const std::function<bool()>& give_up)
       : motor_(motor),
         baud_(baud),
         clock_(clock),
@@ -56,7 +58,7 @@ class Link {
     if (!capture.empty()) capture_ = std::make_unique<Capture>(capture);
     thread_ = start_thread({"motor", true}, [this] { run(); });
     try {
-      wait_until_ready();
+      wait_until_ready(give_up);
     } catch (...) {
       end_thread();
       throw;
@@ -65,13 +67,20 @@ class Link {
   ~Link() { end_thread(); }
 
  private:
-  void wait_until_ready() {
+  void wait_until_ready(const std::function<bool()>& give_up) {
     std::unique_lock lock(motor_.mutex_);
-    const bool decided = motor_.changed_.wait_for(
-        lock, kConnectLimit, [&] { return motor_.lost() || motor_.state_ == Session::State::ready; });
-    if (decided && !motor_.lost()) return;
+    const auto limit = steady_clock::now() + kConnectLimit;
+    bool decided = false, unwanted = false;
+    while (!decided && !unwanted && steady_clock::now() < limit) {
+      decided = motor_.changed_.wait_for(lock, kGiveUpEvery,
+                                         [&] { return motor_.lost() || motor_.state_ == Session::State::ready; });
+      unwanted = give_up && give_up();
+    }
+    if (decided && !unwanted && !motor_.lost()) return;
     throw DeviceError("motor module on " + motor_.device(), fmt::format("connect at {} baud", baud_),
-                      decided ? motor_.failure_ : std::string("not connected in time"),
+                      unwanted  ? std::string("given up on request")
+                      : decided ? motor_.failure_
+                                : std::string("not connected in time"),
                       "check its supply, RX and TX, the baud rate and the module id");
   }
 
@@ -271,8 +280,8 @@ class Link {
 };
 
 Motor::Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
-             const std::string& capture)
-    : device_(device), link_(std::make_unique<Link>(*this, baud, settings, clock, capture)) {}
+             const std::string& capture, const std::function<bool()>& give_up)
+    : device_(device), link_(std::make_unique<Link>(*this, baud, settings, clock, capture, give_up)) {}
 
 Motor::~Motor() { (void)await_coast(order_coast(), kStopLimit); }
 

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -45,10 +46,11 @@ class Motor {
   /// becomes 10/baud. module_timeout_s goes to the module as it is, in the module's own seconds. Throws DeviceError:
   /// port missing, forbidden or in use, no module answers, the module refused its communication timeout. Prefer a
   /// `device` name that stays (/dev/serial/by-id/…): it is opened again after the port was lost. `clock` must outlive
-  /// the motor. `capture`: file for all bytes of the line (capture.hpp); empty: no capture. One that only inspects
+  /// the motor. `capture`: file for all bytes of the line (capture.hpp); empty: no capture. `give_up` is asked while it
+  /// connects; true: DeviceError. One that only inspects
   /// (Settings) is never alive.
   Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
-        const std::string& capture = {});
+        const std::string& capture = {}, const std::function<bool()>& give_up = {});
   /// Coasts three times, waits at most 0.6 s for drive mode coast, closes.
   ~Motor();
 

@@ -11,7 +11,7 @@ namespace supply_link_test {
 TEST(OutputEnable, HoldsThePowerWhileItLivesAlsoOnTheWayOutOfAnException) {
   QueueSupply supply;
   const auto fail = [&] {
-    const OutputEnable powered(supply);
+    const OutputEnable powered(supply, test::never);
     EXPECT_TRUE(supply.on);
     throw std::runtime_error("something else");
   };
@@ -22,7 +22,7 @@ TEST(OutputEnable, HoldsThePowerWhileItLivesAlsoOnTheWayOutOfAnException) {
 TEST(OutputEnable, SwitchesOffWhenSwitchingOnFailsHalfway) {
   QueueSupply supply;
   supply.refuses = true;
-  EXPECT_THROW(OutputEnable{supply}, std::runtime_error);
+  EXPECT_THROW((OutputEnable{supply, test::never}), std::runtime_error);
   EXPECT_FALSE(supply.on);
 }
 
@@ -35,12 +35,12 @@ struct PoweredMotor {
 
 TEST(MotorPower, GoesOffOnlyOnceTheMotorsLinkIsClosedAndComesBackBeforeTheLink) {
   PoweredMotor bench;
-  MotorPower power(&bench.supply);
+  MotorPower power(&bench.supply, test::never);
   EXPECT_TRUE(bench.supply.on);
   EXPECT_TRUE(power.off(bench.motor));
   EXPECT_EQ(bench.motor.rests, 1);
   EXPECT_FALSE(bench.supply.on);
-  power.restore(bench.motor, bench.clock, [&] {
+  power.restore(bench.motor, bench.clock, test::never, [&] {
     EXPECT_TRUE(bench.supply.on);
     EXPECT_EQ(bench.motor.wakes, 0);
   });
@@ -49,29 +49,29 @@ TEST(MotorPower, GoesOffOnlyOnceTheMotorsLinkIsClosedAndComesBackBeforeTheLink) 
 
 TEST(MotorPower, ThatIsNotConfirmedOffIsASafetyStop) {
   PoweredMotor bench;
-  MotorPower power(&bench.supply);
+  MotorPower power(&bench.supply, test::never);
   bench.supply.unconfirmed = kNotOff;
   EXPECT_THROW((void)power.off(bench.motor), SafetyStop);
 }
 
 TEST(MotorPower, ComesBackToNoBenchWhoseComputerSlept) {
   PoweredMotor bench;
-  MotorPower power(&bench.supply);
+  MotorPower power(&bench.supply, test::never);
   (void)power.off(bench.motor);
   bench.clock.suspend(std::chrono::milliseconds(200));
-  EXPECT_THROW(power.restore(bench.motor, bench.clock), SafetyStop);
+  EXPECT_THROW(power.restore(bench.motor, bench.clock, test::never), SafetyStop);
   EXPECT_FALSE(bench.supply.on);
 }
 
 TEST(MotorPower, OfAnotherSupplyStaysOnAndOnlyALostModuleIsConnectedAgain) {
   PoweredMotor bench;
-  MotorPower power(nullptr);
+  MotorPower power(nullptr, test::never);
   EXPECT_FALSE(power.off(bench.motor));
   EXPECT_EQ(bench.motor.rests, 0);
-  power.restore(bench.motor, bench.clock);
+  power.restore(bench.motor, bench.clock, test::never);
   EXPECT_EQ(bench.motor.wakes, 0);
   bench.motor.lost = "its power was cut";
-  power.restore(bench.motor, bench.clock);
+  power.restore(bench.motor, bench.clock, test::never);
   EXPECT_EQ(bench.motor.wakes, 1);
 }
 

@@ -21,11 +21,24 @@ const profiles::Propeller kPropeller{"5x3", "Test 5 inch", 5, 3};
 
 class Prompt : public testing::Test {
  protected:
-  Prompt() { EXPECT_EQ(pipe(pipe_.data()), 0); }
-  ~Prompt() override { close(pipe_[0]); }
-  void answer(const std::string& typed) {
-    EXPECT_EQ(write(pipe_[1], typed.data(), typed.size()), static_cast<ssize_t>(typed.size()));
-    close(pipe_[1]);
+  ~Prompt() override {
+    close(pipe_[0]);
+    leave();
+  }
+  /// Each line once a question is asked; then the end of the input.
+  void answer(const std::string& typed) { typed_ = typed; }
+  void type(const std::string& words) {
+    EXPECT_EQ(write(pipe_[1], words.data(), words.size()), static_cast<ssize_t>(words.size()));
+  }
+  void leave() {
+    if (pipe_[1] >= 0) close(std::exchange(pipe_[1], -1));
+  }
+  void type_the_next() {
+    if (typed_.empty()) return leave();
+    const std::size_t line = std::min(typed_.find('\n'), typed_.size() - 1) + 1;
+    type(typed_.substr(0, line));
+    if (typed_[line - 1] != '\n') leave();
+    typed_.erase(0, line);
   }
   void mount(double occlusion_deg) {
     const MountConfirmation mounted =
@@ -34,14 +47,24 @@ class Prompt : public testing::Test {
   }
   bool run_again() { return person().run_again({90, "repetition 2 is 3 % off", 1, 2}); }
   TerminalOperator person() {
-    TerminalOperator person(pipe_[0], words_.stream, [this] { return stop_; });
-    person.log_to([this](const char* event, const std::string& words) { record_.push_back(event + (": " + words)); });
+    TerminalOperator person(terminal_, words_.stream, [this] { return stop_; });
+    person.log_to([this](const std::string& event, const std::string& words, const std::optional<Duration>& took) {
+      record_.push_back(event + ": " + words);
+      EXPECT_EQ(took.has_value(), event == "operator_answered");
+      if (event == "operator_asked") type_the_next();
+    });
     return person;
   }
   std::string said() { return words_.text(); }
 
-  std::array<int, 2> pipe_{};
+  std::array<int, 2> pipe_ = [] {
+    std::array<int, 2> ends{};
+    EXPECT_EQ(pipe(ends.data()), 0);
+    return ends;
+  }();
   test::Written words_;
+  Terminal terminal_{pipe_[0], words_.stream};
+  std::string typed_;
   bool stop_ = false;
   std::vector<std::string> record_;
 };
@@ -59,7 +82,7 @@ TEST_F(Prompt, SaysNoOcclusionForZero) {
 }
 
 TEST_F(Prompt, AsksAgainAfterAWrongAngle) {
-  answer("45\nninety\n\n90 \n90\n");
+  answer("45\nninety\n\n 90 \n");
   mount(90);
   EXPECT_THAT(said(), AllOf(HasSubstr("You typed \"45\"; this run needs 90 degrees."),
                             HasSubstr("You typed \"ninety\"; this run needs 90 degrees.")));
@@ -74,6 +97,38 @@ TEST_P(Unmounted, IsWhatQAndTheEndOfTheInputMean) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Prompt, Unmounted, testing::Values("q\n", "9", ""));
+
+TEST_F(Prompt, TakesNothingForAnAnswerThatWasTypedBeforeItsQuestion) {
+  type("90\n90\n");
+  answer("q\n");
+  EXPECT_THROW(mount(90), NotMounted);
+  EXPECT_THAT(said(), HasSubstr("What was typed before the question does not count.\n"));
+}
+
+TEST_F(Prompt, SaysOnceThatItDiscardsWhatWasTypedBefore) {
+  for (int question = 0; question < 3; ++question) {
+    type("90\n");
+    answer("90\n");
+    mount(90);
+  }
+  const std::string words = said();
+  EXPECT_EQ(words.find("What was typed before"), words.rfind("What was typed before"));
+}
+
+TEST_F(Prompt, UnderstandsCapitalsAndBlanks) {
+  answer(" Y \n");
+  EXPECT_TRUE(run_again());
+  answer("Continue\n");
+  person().clear_safety_stop("thrust");
+  answer("Q\n");
+  EXPECT_THROW(mount(90), NotMounted);
+}
+
+TEST_F(Prompt, ShowsWhatWasTypedWithoutItsControlCharacters) {
+  answer("\x1b[2J\n90\n");
+  mount(90);
+  EXPECT_THAT(said(), testing::Not(HasSubstr("\x1b")));
+}
 
 TEST_F(Prompt, StopsWhenASignalCame) {
   stop_ = true;
@@ -113,6 +168,7 @@ TEST_F(Prompt, DictatesWhatIsAskedAndWhateverIsTyped) {
 
 TEST_F(Prompt, EndsAsSoonAsTheGuardThatLivesThroughItTrips) {
   TerminalOperator asked = person();
+  asked.log_to({});
   int looks = 0;
   asked.while_waiting([&] {
     if (++looks == 3) throw SafetyStop("motor: the rotor turns at 100 RPM while somebody may be near");
@@ -204,7 +260,9 @@ TEST(AnsweringOperator, ConfirmsTheMountingOfAnotherRunWithTheAnswerToRunIt) {
 TEST(AnsweringOperator, DictatesEachQuestionAndAnswer) {
   auto person = answering("mountings: [0, 45]\nrun_again: [true]\n");
   std::vector<std::string> record;
-  person.log_to([&](const char* event, const std::string& words) { record.push_back(event + (": " + words)); });
+  person.log_to([&](const char* event, const std::string& words, const std::optional<Duration>&) {
+    record.push_back(event + (": " + words));
+  });
   ask(person, 0);
   (void)person.run_again(question());
   EXPECT_NE(refused([&] { ask(person, 90); }), "");

@@ -4,6 +4,8 @@
 
 #include <deque>
 
+#include "test/daq/bench_fixture.hpp"
+
 namespace kphi::daq {
 namespace hand_control_test {
 
@@ -13,13 +15,7 @@ using std::chrono::seconds;
 class Hand : public testing::Test {
  protected:
   [[nodiscard]] HandControl control(std::optional<Duration> lasts = std::nullopt) {
-    return HandControl({from_rpm(6000), from_rpm(500), from_rpm(7000), lasts, seconds(30)},
-                       [this]() -> std::optional<Key> {
-                         if (keys_.empty()) return std::nullopt;
-                         const Key key = keys_.front();
-                         keys_.pop_front();
-                         return key;
-                       });
+    return HandControl({from_rpm(6000), from_rpm(500), from_rpm(7000), lasts, seconds(30)}, pressed_);
   }
   /// What is wanted once these keys were pressed, RPM; -1: to stop.
   static double rpm(HandControl& control, Duration now, RadPerSec commanded) {
@@ -27,6 +23,14 @@ class Hand : public testing::Test {
     return wanted ? std::round(to_rpm(*wanted)) : -1;
   }
   std::deque<Key> keys_;
+
+ private:
+  test::PressedKeys pressed_{[this]() -> std::optional<Key> {
+    if (keys_.empty()) return std::nullopt;
+    const Key key = keys_.front();
+    keys_.pop_front();
+    return key;
+  }};
 };
 
 TEST_F(Hand, BeginsWithItsSpeedAndGoesUpAndDownByAStepWithinItsBounds) {
@@ -35,9 +39,32 @@ TEST_F(Hand, BeginsWithItsSpeedAndGoesUpAndDownByAStepWithinItsBounds) {
   keys_ = {Key::up};
   EXPECT_EQ(rpm(hand, seconds(1), from_rpm(6000)), 6500);
   keys_ = {Key::up, Key::up, Key::up};
-  EXPECT_EQ(rpm(hand, seconds(2), from_rpm(6500)), 7000) << "the highest";
+  EXPECT_EQ(rpm(hand, seconds(2), from_rpm(6600)), 7000) << "the highest";
   keys_ = std::deque<Key>(100, Key::down);
-  EXPECT_EQ(rpm(hand, seconds(3), from_rpm(7000)), 500) << "never to rest, which is stop";
+  EXPECT_EQ(rpm(hand, seconds(3), from_rpm(800)), 500) << "never to rest, which is stop";
+}
+
+TEST_F(Hand, NeverWantsMoreThanOneStepBeyondWhatIsCommanded) {
+  HandControl hand = control();
+  EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), 6000);
+  keys_ = std::deque<Key>(30, Key::down);
+  EXPECT_EQ(rpm(hand, seconds(1), from_rpm(6000)), 5500);
+  keys_ = std::deque<Key>(30, Key::up);
+  EXPECT_EQ(rpm(hand, seconds(2), from_rpm(5600)), 6100);
+  EXPECT_EQ(rpm(hand, seconds(3), from_rpm(5700)), 6100) << "and it does not follow by itself";
+}
+
+TEST_F(Hand, IsNotSlowedByTheKeyForMoreWhileItGetsThere) {
+  HandControl hand = control();
+  keys_ = {Key::up};
+  EXPECT_EQ(rpm(hand, seconds(1), from_rpm(100)), 6000);
+}
+
+TEST_F(Hand, GoesNoFasterAtTheKeyForLessBelowOneStep) {
+  HandControl hand = control();
+  (void)hand.wanted(seconds(0), RadPerSec(0));
+  keys_ = {Key::hold, Key::down};
+  EXPECT_EQ(rpm(hand, seconds(1), from_rpm(321)), 321);
 }
 
 TEST_F(Hand, HoldsWhereTheRampIs) {
@@ -54,11 +81,13 @@ TEST_F(Hand, HasNothingToHoldBeforeTheMotorTurns) {
   EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), 6000);
 }
 
-TEST_F(Hand, ForgetsWhatWasPressedBeforeItBegan) {
+TEST_F(Hand, IsCalledOffByAStopBeforeItBegan) {
   HandControl hand = control();
-  keys_ = {Key::up, Key::stop};
-  hand.forget_keys();
-  EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), 6000);
+  keys_ = {Key::up, Key::hold};
+  EXPECT_FALSE(hand.is_called_off());
+  keys_ = {Key::stop, Key::up};
+  EXPECT_TRUE(hand.is_called_off());
+  EXPECT_EQ(rpm(hand, seconds(0), RadPerSec(0)), -1);
 }
 
 TEST_F(Hand, StopsForGoodAtTheKey) {

@@ -42,14 +42,14 @@ class ByHand : public testing::Test {
   }
   SpinResult spin(HandControl::Settings speeds, const std::function<bool()>& stop_asked = test::never) {
     AutoConfirmOperator person;
-    return spin_by_hand({*bench_, campaign_, config_, person, said_, stop_asked, speeds,
-                         [this]() -> std::optional<Key> {
-                           if (keys_.empty() || bench_->clock().now() < keys_.front().first) return std::nullopt;
-                           const Key key = keys_.front().second;
-                           keys_.erase(keys_.begin());
-                           return key;
-                         },
-                         folder_.path() / "spin.h5"});
+    test::PressedKeys keys([this]() -> std::optional<Key> {
+      if (keys_.empty() || bench_->clock().now() < keys_.front().first) return std::nullopt;
+      const Key key = keys_.front().second;
+      keys_.erase(keys_.begin());
+      return key;
+    });
+    return spin_by_hand(
+        {*bench_, campaign_, config_, person, said_, stop_asked, speeds, keys, folder_.path() / "spin.h5"});
   }
   static std::vector<int> rpm(const SpinResult& result) {
     std::vector<int> speeds;
@@ -80,7 +80,10 @@ TEST_F(ByHand, HoldsItsSpeedForTheTimeAndRecordsIt) {
 
 TEST_F(ByHand, FollowsTheKeysNoFasterThanItsSlew) {
   make();
-  keys_ = {{seconds(6), Key::up}, {seconds(9), Key::down}, {seconds(9), Key::down}, {seconds(12), Key::stop}};
+  keys_ = {{seconds(6), Key::up},
+           {seconds(9), Key::down},
+           {std::chrono::milliseconds(9300), Key::down},
+           {seconds(12), Key::stop}};
   const SpinResult result = spin(from(6000));
   EXPECT_THAT(rpm(result), ElementsAre(6000, 6500, 5500));
   const results::RunRecording run = results::read_run(result.run.file);
@@ -109,8 +112,22 @@ TEST_F(ByHand, DoesNotBeginToTurnAfterAKeyDuringTheZero) {
   make();
   keys_ = {{std::chrono::milliseconds(300), Key::stop}};
   bench_->spoilt_motor.before_speed = [] { ADD_FAILURE() << "a speed"; };
-  EXPECT_THAT(rpm(spin(from(6000))), ElementsAre());
-  EXPECT_THAT(said_.said, HasSubstr("stopping: a key was pressed"));
+  EXPECT_THROW((void)spin(from(6000)), Interrupted);
+}
+
+TEST_F(ByHand, DoesNotBeginToTurnAfterAKeyWhileThePowerComesBack) {
+  make();
+  keys_ = {{Instant(0), Key::up}, {Instant(0), Key::stop}};  // right after the answer
+  bench_->spoilt_motor.before_speed = [] { ADD_FAILURE() << "a speed"; };
+  EXPECT_THAT(test::words_of<Interrupted>([&] { return spin(from(6000)); }), HasSubstr("stopped by request before"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path() / "spin.h5"));
+}
+
+TEST_F(ByHand, DoesNotRunAfterAKeyThatWasHeldDown) {
+  make();
+  keys_.assign(30, {seconds(7), Key::up});
+  keys_.emplace_back(seconds(15), Key::stop);
+  EXPECT_THAT(rpm(spin(from(6000))), ElementsAre(6000, 6500)) << "one step ahead of what is commanded, not thirty";
 }
 
 TEST_F(ByHand, StopsWhenNobodyIsAtTheKeys) {
@@ -127,7 +144,7 @@ TEST_F(ByHand, EndsAtARequestAsARunDoes) {
 TEST_F(ByHand, KeepsTheLimitsOfARun) {
   make();
   campaign_.limits["thrust_max_n"] = 1;
-  keys_.assign(40, {seconds(5), Key::up});
+  for (int i = 0; i < 40; ++i) keys_.emplace_back(seconds(5) + i * std::chrono::milliseconds(300), Key::up);
   EXPECT_THAT(test::words_of<SafetyStop>([&] { return spin(from(6000)); }),
               testing::ContainsRegex("thrust .* N is above 1 N .campaign limits.thrust_max_n"));
 }
@@ -149,8 +166,9 @@ TEST_F(ByHand, TurnsNothingWithoutSomebodyWhoSaysThatTheStandIsClear) {
    protected:
     void mount(const profiles::Propeller&, double, const std::string&) override {}
   } nobody;
-  EXPECT_THROW((void)spin_by_hand({*bench_, campaign_, config_, nobody, said_, test::never, from(6000),
-                                   [] { return std::nullopt; }, folder_.path() / "spin.h5"}),
+  test::PressedKeys keys([] { return std::nullopt; });
+  EXPECT_THROW((void)spin_by_hand({*bench_, campaign_, config_, nobody, said_, test::never, from(6000), keys,
+                                   folder_.path() / "spin.h5"}),
                NotMounted);
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "spin.h5"));
 }

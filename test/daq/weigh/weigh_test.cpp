@@ -34,13 +34,13 @@ class Weighed : public testing::Test {
     weighing.mass_u_kg = 1e-5;
     weighing.gravity_u_m_s2 = 1e-4;
     weighing.axis = axis;
-    return weigh({*bench_, said_, stop_asked_, next_key_, weighing, 3, std::chrono::seconds(2)});
+    return weigh({*bench_, said_, stop_asked_, keys_.press ? &keys_ : nullptr, weighing, 3, std::chrono::seconds(2)});
   }
   profiles::BenchConfig config_;
   std::optional<CoastingBench> bench_;
   test::SaidLines said_;
   std::function<bool()> stop_asked_ = test::never;
-  std::function<std::optional<Key>()> next_key_;
+  test::PressedKeys keys_{{}};
 };
 
 TEST_F(Weighed, FindsTheGainOfTheCellWithinItsUncertainty) {
@@ -66,7 +66,7 @@ TEST_F(Weighed, AsksForTheMassOffAndOnAndGoesOnAtTheKeyAlone) {
   bench();
   int presses = 0;
   Instant asked{};
-  next_key_ = [&]() -> std::optional<Key> {
+  keys_.press = [&]() -> std::optional<Key> {
     if (asked == Instant{}) asked = bench_->clock().now();
     if (bench_->clock().now() - asked < std::chrono::seconds(5)) return std::nullopt;
     asked = Instant{};
@@ -75,6 +75,7 @@ TEST_F(Weighed, AsksForTheMassOffAndOnAndGoesOnAtTheKeyAlone) {
   };
   EXPECT_EQ(weigh_half_a_kilo().levels.size(), 7u);
   EXPECT_EQ(presses, 8);
+  EXPECT_EQ(keys_.forgotten, 7) << "what was pressed before a question is no answer";
   EXPECT_EQ(said_.count("Take everything off; then press Enter."), 4);
   EXPECT_EQ(said_.count("Put 0.5 kg on, so that it pulls along z; then press Enter."), 3);
   EXPECT_EQ(said_.count("the supply's output is off"), 1);
@@ -83,7 +84,7 @@ TEST_F(Weighed, AsksForTheMassOffAndOnAndGoesOnAtTheKeyAlone) {
 TEST_F(Weighed, AsksAgainWhenTheMassCannotBeOn) {
   bench(0.4);  // reads two fifths: as if another mass were on
   int presses = 0;
-  next_key_ = [&]() -> std::optional<Key> { return ++presses < 4 ? Key::hold : Key::stop; };
+  keys_.press = [&]() -> std::optional<Key> { return ++presses < 4 ? Key::hold : Key::stop; };
   EXPECT_THROW((void)weigh_half_a_kilo(), Interrupted);
   EXPECT_EQ(said_.count("is that mass on, and along z?"), 2);
   EXPECT_EQ(said_.count("Put 0.5 kg on"), 3);
@@ -102,11 +103,11 @@ TEST_F(Weighed, RefusesMoreThanTheCellBears) {
 
 TEST_F(Weighed, StopsAtAnotherKeyOrASignal) {
   bench();
-  next_key_ = [] { return std::optional(Key::stop); };
+  keys_.press = [] { return std::optional(Key::stop); };
   EXPECT_THAT(test::words_of<Interrupted>([&] { return weigh_half_a_kilo(); }), HasSubstr("stopped by a key"));
   int calls = 0;
   stop_asked_ = [&] { return ++calls > 100; };
-  next_key_ = {};
+  keys_.press = {};
   EXPECT_THROW((void)weigh_half_a_kilo(), Interrupted);
 }
 
@@ -115,14 +116,14 @@ TEST_F(Weighed, StopsWhenThePowerComesBackWhileSomebodyIsNear) {
   bench_->spoilt_supply->spoil = [&](SupplyReading& reading) {
     if (said_.count("Put ") == 1) reading.output = 1;
   };
-  next_key_ = [] { return std::optional(Key::hold); };
+  keys_.press = [] { return std::optional(Key::hold); };
   EXPECT_THAT(test::words_of<SafetyStop>([&] { return weigh_half_a_kilo(); }),
               HasSubstr("output is on while somebody may be near"));
 }
 
 TEST_F(Weighed, SaysThatTheLoadDoesNotComeToRest) {
   bench();
-  next_key_ = {};
+  keys_.press = {};
   double swings = 0;
   said_.at_tick = [&](const Position&, const Observation&) {
     bench_->bench.hung(2, swings += 0.01);  // somebody pours sand

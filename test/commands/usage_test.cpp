@@ -1,0 +1,48 @@
+#include "commands/usage.hpp"
+
+#include <gmock/gmock.h>
+
+#include "commands/commands.hpp"
+
+namespace kphi::commands::usage_test {
+
+/// What the program says to these words, none of which starts a verb.
+std::string refusal(const std::vector<std::string>& words) {
+  CLI::App program;
+  ExitCode exit_code = ExitCode::ok;
+  for (AddVerb* add : kVerbs) add(program, exit_code);
+  program.require_subcommand(1);
+  require_finite_numbers(program);
+  try {
+    program.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  } catch (const CLI::ParseError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Numbers, OfTheCommandLineAreFiniteInEveryOptionOfEveryVerb) {
+  CLI::App program;
+  ExitCode exit_code = ExitCode::ok;
+  for (AddVerb* add : kVerbs) add(program, exit_code);
+  int options = 0;
+  for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) {
+    for (const CLI::Option* option : verb->get_options()) {
+      if (option->get_items_expected_max() == 0 || option->get_lnames().empty()) continue;
+      for (const char* number : {"nan", "-NaN", "inf", "-Infinity", "1e999"}) {
+        const std::string words = verb->get_name() + " --" + option->get_lnames().front() + "=" + number;
+        EXPECT_NE(refusal({verb->get_name(), "--" + option->get_lnames().front() + "=" + number}), "") << words;
+      }
+      ++options;
+    }
+  }
+  EXPECT_GT(options, 100);
+}
+
+TEST(Numbers, ThatAreNotFiniteAreNamed) {
+  EXPECT_THAT(refusal({"spin", "--slew", "nan"}), testing::HasSubstr("--slew: nan is not a finite number"));
+  EXPECT_THAT(refusal({"run", "nan"}), testing::HasSubstr("nan is not a finite number"));
+  EXPECT_THAT(refusal({"spin", "--slew", "1e3"}), testing::Not(testing::HasSubstr("finite")));
+}
+
+}  // namespace kphi::commands::usage_test

@@ -1,0 +1,313 @@
+// What a person's hands do at a terminal, and when: nothing turns on a word that nobody said now. Over the true
+// transports, through a pseudo-terminal; where jobs are controlled, by bash.
+#include <gmock/gmock.h>
+
+#include <random>
+
+#include "results/journal.hpp"
+#include "test/end_to_end/running_bench.hpp"
+#include "test/end_to_end/terminal.hpp"
+
+namespace kphi::test::hands_test {
+
+using testing::HasSubstr;
+using testing::Not;
+
+std::vector<std::string> spin(const RunningBench& bench, const std::string& dead_man_s = "4") {
+  return {kphi(),       "spin",     "--bench", bench.path("bench.yaml"), "--rpm", "6000",
+          "--dead-man", dead_man_s, "--out",   bench.path("results")};
+}
+
+bool has_turned(const Account& account) { return account.last_speed_at() >= 0; }
+
+/// A campaign of two mountings, asked for at a terminal.
+class TwoMountings {
+ public:
+  TwoMountings() {
+    write(bench.path("two.yaml"), short_campaign_text("90, 180", 1, 2));
+    run.emplace(std::vector<std::string>{kphi(), "run", bench.path("two.yaml"), "--bench", bench.path("bench.yaml"),
+                                         "--out", bench.path("results")},
+                "", Surroundings{{}, terminal.descriptor(), 0});
+  }
+  RunningBench bench{Manner{.time_scale = 4, .supply = true}};
+  Terminal terminal;
+  std::optional<Process> run;
+};
+
+TEST(TypedAhead, AnswersNoQuestionThatIsStillToBeAsked) {
+  TwoMountings stand;
+  stand.run->wait_for_prompt();
+  stand.terminal.press("90\n180\n");
+  stand.run->wait_for("Mount the 180° occlusion");
+  stand.run->wait_for_prompt();
+  stand.terminal.type("q");
+  EXPECT_EQ(stand.run->wait(), 130) << stand.run->err();
+  EXPECT_THAT(stand.run->err(), HasSubstr("1 of 2 runs finished"));
+  EXPECT_TRUE(safely(stand.bench.account().ends_without_power()));
+}
+
+TEST(TypedAhead, IsNoticedInTheJournalByTheTimeThatAnAnswerTook) {
+  TwoMountings stand;
+  stand.run->wait_for_prompt();
+  stand.terminal.type("Q");
+  EXPECT_EQ(stand.run->wait(), 130) << stand.run->err();
+  const auto folder = campaign_below(stand.bench.path("results"), "journal.jsonl");
+  ASSERT_TRUE(folder);
+  double after_s = -1;
+  for (const auto& entry : results::read_journal(folder->journal()).entries)
+    if (entry.event == "operator_answered") after_s = entry.data.at("after_s").get<double>();
+  EXPECT_GE(after_s, 0);
+  EXPECT_LT(after_s, 60);
+}
+
+TEST(TypedAhead, DoesNotStartTheMotorThatIsStillBeingConnected) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Terminal terminal;
+  terminal.type("go");
+  Process program(in_real_time(spin(bench)), {}, {{}, terminal.descriptor(), 0});
+  program.wait_for_prompt();
+  terminal.type("q");
+  EXPECT_EQ(program.wait(), 130) << program.err();
+  EXPECT_TRUE(safely(!has_turned(bench.account())));
+}
+
+/// When after the answer a key is pressed.
+class SecondAfterGo : public testing::TestWithParam<const char*> {};
+
+TEST_P(SecondAfterGo, BelongsToTheKeyThatStops) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Terminal terminal;
+  Process program(in_real_time(spin(bench)), {}, {{}, terminal.descriptor(), 0});
+  program.wait_for_prompt();
+  const std::string when = GetParam();
+  terminal.press(when == "AtOnce" ? "Go\n " : "go\n");
+  if (when == "WithPower") {
+    ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == true; }));
+  }
+  if (when == "DuringTheZero") program.wait_for("zero");
+  if (when != "AtOnce") terminal.press(" ");
+  EXPECT_EQ(program.wait(), 130) << program.err();
+  const Account account = bench.account();
+  EXPECT_TRUE(safely(!has_turned(account)));
+  EXPECT_TRUE(safely(account.ends_without_power()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Pressed, SecondAfterGo, testing::Values("AtOnce", "WithPower", "DuringTheZero"),
+                         [](const auto& when) { return std::string(when.param); });
+
+/// A shell that controls jobs, at a terminal.
+class Shell {
+ public:
+  Shell()
+      : process_({"setsid", "--ctty", "bash", "--norc", "--noprofile", "-i"}, {},
+                 {{"PS1=READY> "}, terminal_.descriptor(), 0}) {
+    await_ready();
+  }
+  void start(const std::vector<std::string>& command) { type(fmt::format("{}", fmt::join(command, " "))); }
+  void type(const std::string& line) { terminal_.type(line); }
+  void press(const std::string& keys) { terminal_.press(keys); }
+  void hear(std::chrono::milliseconds limit) { (void)process_.hear(limit); }
+  /// Until the program asks; false: it has ended or was stopped.
+  bool is_asked() { return process_.wait_for_prompt({"to stop: ", "READY> "}) == 0; }
+  void wait_for(const std::string& words) { process_.wait_for(words); }
+  /// The program has ended or was stopped.
+  void await_ready() { (void)process_.wait_for_prompt({"READY> "}); }
+  /// Of the last job, which has ended.
+  int exit_code() {
+    type("echo en''ded: $?");
+    const std::string line = process_.wait_for("ended: ");
+    return std::stoi(line.substr(line.find("ended: ") + 7));
+  }
+  /// Lets what was stopped continue; returns once no job is left.
+  void await_end() {
+    do {
+      await_ready();
+      type("fg 2>/dev/null || echo NO''JOB >&2");
+    } while (process_.wait_for_prompt({"NOJOB", "READY> "}) != 0);
+    await_ready();
+  }
+  [[nodiscard]] std::string words() const { return process_.err(); }
+
+ private:
+  Terminal terminal_;
+  Process process_;
+};
+
+TEST(CtrlZ, CoastsFirstAndNothingTurnsAfterwards) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Shell shell;
+  shell.start(spin(bench));
+  ASSERT_TRUE(shell.is_asked()) << shell.words();
+  shell.type("go");
+  ASSERT_TRUE(bench.await_speed(600)) << shell.words();
+  shell.press("\x1a");
+  ASSERT_TRUE(bench.await([](const auto& now) { return now["drive"]["mode"] == "coast"; }));
+  ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == false; })) << "before it stops";
+  shell.await_ready();
+  shell.type("fg");
+  shell.await_ready();
+  EXPECT_EQ(shell.exit_code(), 130) << shell.words();
+  const Account account = bench.account();
+  EXPECT_TRUE(safely(account.ends_without_power()));
+  EXPECT_LT(account.last_speed_at(), account.coasts_at()) << "nothing turned after it";
+}
+
+TEST(CtrlZ, AtAQuestionOnlyStopsTheProgramAndTheQuestionIsAskedAgain) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Shell shell;
+  shell.start(spin(bench));
+  ASSERT_TRUE(shell.is_asked()) << shell.words();
+  shell.press("\x1a");
+  shell.await_ready();
+  shell.type("fg");
+  ASSERT_TRUE(shell.is_asked()) << shell.words();
+  shell.type("q");
+  shell.await_ready();
+  EXPECT_EQ(shell.exit_code(), 130) << shell.words();
+  EXPECT_TRUE(safely(!has_turned(bench.account())));
+}
+
+TEST(CtrlZ, LeavesNoMotorWhoseKeysBelongToTheShell) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Shell shell;
+  shell.start(joined(spin(bench), {"--yes", "&"}));
+  shell.wait_for("in the background");
+  EXPECT_TRUE(safely(!has_turned(bench.account())));
+}
+
+/// What random hands did at one program, in ms of the bench.
+struct Deeds {
+  double started = 0, ended = 0;
+  std::vector<double> answers;  ///< right ones, each typed after its question
+  double last_key = 0;          ///< that steers; or the answer
+  std::string story;
+};
+
+/// Random keys, words and job-control signals, before, at and after the questions of a program.
+class RandomHands {
+ public:
+  RandomHands(const RunningBench& bench, Shell& shell, unsigned seed) : bench_(bench), shell_(shell), random_(seed) {}
+
+  /// `right`: the answers that the program wants, in their order.
+  Deeds at(const std::vector<std::string>& command, const std::vector<std::string>& right) {
+    deeds_ = {};
+    deeds_.started = bench_.time_ms();
+    shell_.start(command);
+    if (once_in(2)) press(right.front() + "\n" + right.back() + "\n+ ");
+    for (const std::string& answer : right)
+      if (!answers(answer)) break;
+    if (!deeds_.answers.empty() && command[1] == "spin") steer();
+    shell_.await_end();
+    deeds_.ended = bench_.time_ms();
+    return std::move(deeds_);
+  }
+
+ private:
+  int pick(int below) { return std::uniform_int_distribution<int>(0, below - 1)(random_); }
+  bool once_in(int n) { return pick(n) == 0; }
+  std::string one_of(const std::vector<std::string>& all) {
+    return all[static_cast<std::size_t>(pick(static_cast<int>(all.size())))];
+  }
+  void press(const std::string& keys) {
+    std::string shown;
+    for (const char c : keys) shown += c >= ' ' ? std::string(1, c) : fmt::format("^{}", static_cast<char>(c + '@'));
+    deeds_.story += fmt::format("  {:.0f} ms: {}\n", bench_.time_ms(), shown);
+    shell_.press(keys);
+  }
+  /// False: the program asks nothing more.
+  bool answers(const std::string& answer) {
+    if (!shell_.is_asked()) return false;
+    while (once_in(3)) {
+      press(one_of({"\n", "no\n", "yes\n", "45.5\n", "GO AWAY\n", "+\n"}));
+      if (!shell_.is_asked()) return false;
+    }
+    while (once_in(4)) {
+      press("\x1a");
+      shell_.await_ready();
+      shell_.type(once_in(2) ? "bg; fg" : "fg");
+      if (!shell_.is_asked()) return false;
+    }
+    if (once_in(6)) {
+      press(one_of({"q\n", "Q \n", "\x03", "\x04"}));
+      return false;
+    }
+    deeds_.answers.push_back(deeds_.last_key = bench_.time_ms());
+    press(answer + "\n");
+    return true;
+  }
+  void steer() {
+    for (int keys = pick(12); keys > 0; --keys) {
+      shell_.hear(std::chrono::milliseconds(pick(400)));
+      const std::string key = one_of({"+", "-", "h", "\n", "\x1b[A", "\x1b[B", "+", "-", "+++++", " ", "x", "\x1a"});
+      if (key != " " && key != "x" && key != "\x1a") deeds_.last_key = bench_.time_ms();
+      press(key);
+      if (key == "\x1a" || key == " " || key == "x") return;
+    }
+  }
+
+  const RunningBench& bench_;
+  Shell& shell_;
+  std::mt19937 random_;
+  Deeds deeds_;
+};
+
+struct Trial {
+  const char* verb;
+  unsigned seed;
+  int sequences;
+};
+
+class Hands : public testing::TestWithParam<Trial> {};
+
+/// On a busy computer, and to the module.
+constexpr double kDeadManMs = 1000, kSlack_ms = 400;
+
+TEST_P(Hands, NeverTurnAMotorWithoutAnAnswerToItsQuestion) {
+  const Trial& trial = GetParam();
+  const bool spins = trial.verb == std::string("spin");
+  RunningBench bench(Manner{.time_scale = spins ? 1.0 : 4.0, .supply = true});
+  write(bench.path("two.yaml"), short_campaign_text("90, 180", 1, 2));
+  const std::vector<std::string> run{
+      kphi(), "run", bench.path("two.yaml"), "--bench", bench.path("bench.yaml"), "--out", bench.path("results")};
+  std::vector<Deeds> all;
+  {
+    Shell shell;
+    RandomHands hands(bench, shell, trial.seed);
+    for (int i = 0; i < trial.sequences; ++i) {
+      all.push_back(spins ? hands.at(spin(bench, "1"), {"go"}) : hands.at(run, {"90", "180"}));
+      ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == false; })) << all.back().story;
+      EXPECT_TRUE(safely(std::abs(bench.status()["speed_rad_s"].get<double>()) < 2000)) << all.back().story;
+    }
+  }
+  const Account account = bench.account();
+  for (const Account::Command& command : account.commands) {
+    if (command.mode != "velocity" || command.target == 0) continue;
+    const auto deeds = std::ranges::find_if(all, [&](const Deeds& one) { return command.at <= one.ended; });
+    ASSERT_NE(deeds, all.end());
+    EXPECT_TRUE(safely(!deeds->answers.empty() && command.at >= deeds->answers.front()))
+        << command.at << " ms: turns without an answer\n"
+        << deeds->story;
+    if (!spins) continue;
+    // Before the first speed there are a zero and the power; without a key it stops a dead man's time after the last.
+    const double turns_from = std::max(deeds->last_key, deeds->answers.front() + 4000);
+    EXPECT_TRUE(safely(command.at <= turns_from + kDeadManMs + kSlack_ms)) << command.at << " ms: turns without a key\n"
+                                                                           << deeds->story;
+  }
+  EXPECT_TRUE(safely(account.ends_without_power()));
+}
+
+std::vector<Trial> trials(unsigned first, unsigned count, int sequences) {
+  std::vector<Trial> all;
+  for (unsigned seed = first; seed < first + count; ++seed)
+    all.push_back({seed % 2 == 0 ? "spin" : "run", seed, sequences});
+  return all;
+}
+
+std::string name_of_trial(const testing::TestParamInfo<Trial>& trial) {
+  return fmt::format("{}{}", trial.param.verb, trial.param.seed);
+}
+
+INSTANTIATE_TEST_SUITE_P(Few, Hands, testing::ValuesIn(trials(0, 2, 3)), name_of_trial);
+INSTANTIATE_TEST_SUITE_P(Many, Hands, testing::ValuesIn(trials(100, 20, 10)), name_of_trial);
+
+}  // namespace kphi::test::hands_test
