@@ -50,7 +50,7 @@ class DelayHistogram {
     return ((index - 8 * power + 1) << power) - 1;
   }
 
-  static constexpr std::size_t kClasses = 8 * 44;
+  static constexpr std::size_t kClasses = std::size_t{8} * 44;
   std::array<std::uint64_t, kClasses> counts_{};
   std::uint64_t total_ = 0;
 };

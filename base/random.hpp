@@ -70,7 +70,7 @@ class Random {
   double symmetric() noexcept { return static_cast<double>(static_cast<std::int64_t>(bits()) >> 11) * 0x1p-52; }
 
  private:
-  static constexpr std::int64_t kMeanOfEight = 4 * 65535;
+  static constexpr std::int64_t kMeanOfEight = std::int64_t{4} * 65535;
 
   static constexpr std::uint64_t rotated(std::uint64_t x, int by) noexcept { return (x << by) | (x >> (64 - by)); }
   static constexpr std::int64_t sum_of_lanes(std::uint64_t x) noexcept {

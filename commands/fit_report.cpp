@@ -246,7 +246,7 @@ ExitCode run_table_line(const FitRequest& request, const FitInput& input, const 
 }
 
 /// Of a log without occlusions: K_T with its budget and a report, but nothing to fly with.
-ExitCode run_K_T_alone(const FitRequest& request, FitInput& input, const Fitted& fitted) {
+ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, const Fitted& fitted) {
   if (!request.out.empty())
     throw ConfigurationError(request.path +
                              ": no occlusion was measured, so no coefficient file can be written; "
@@ -280,7 +280,7 @@ ExitCode run_fit(const FitRequest& request) {
   if (input.table.empty()) input.provenance.bench = options.bench;
   if (options.bench.calibration_note.empty()) input.provenance.cell_weighed.clear();
   fitted.analysis = analyse(identification, options);
-  if (identification.alone()) return run_K_T_alone(request, input, fitted);
+  if (identification.alone()) return run_without_occlusions(request, input, fitted);
   fs::create_directories(folder);
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);

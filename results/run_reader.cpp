@@ -152,6 +152,7 @@ std::vector<MotorReading> motor_of(const Handle& root, const std::string& file, 
     const auto earlier = [](const MotorReading& a, const MotorReading& b) { return a.time_ns < b.time_ns; };
     if (!std::ranges::is_sorted(rows, earlier)) std::ranges::stable_sort(rows, earlier);
     for (MotorReading& row : rows) row.channel = info.channel;
+    if (before == 0) readings.reserve(readings.size() * std::size(kMotorChannels));  // as many of each, as a rule
   }
   return readings;
 }

@@ -16,7 +16,7 @@ StepFigures QuickLook::result() const {
     return thrust.segment(begin, end - begin).mean() / squared.segment(begin, end - begin).mean();
   };
   StepFigures result{thrusts_n_.size(), thrust.mean(), std::sqrt(squared.mean()), k_of(0, n), kUnknown};
-  if (n < 2 * kBlocks) return result;
+  if (n < Eigen::Index{2} * kBlocks) return result;
   // Means of successive blocks: what is correlated within a block counts once.
   Eigen::Array<double, kBlocks, 1> blocks;
   for (Eigen::Index i = 0; i < kBlocks; ++i) blocks[i] = k_of(i * n / kBlocks, (i + 1) * n / kBlocks);

@@ -198,7 +198,7 @@ void Console::write_on(const std::shared_ptr<Shared>& shared) noexcept {
 }
 
 Console& console() noexcept {
-  static Console* const the_programs = new Console;
+  static Console* const the_programs = new Console;  // NOLINT(bugprone-unhandled-exception-at-new)
   return *the_programs;
 }
 

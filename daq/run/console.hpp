@@ -25,7 +25,7 @@ enum class Worth : std::uint8_t {
 
 class WordQueue {
  public:
-  static constexpr std::size_t kRoom = 256 * 1024;  ///< bytes
+  static constexpr std::size_t kRoom = std::size_t{256} * 1024;  ///< bytes
 
   /// A text longer than kRoom is accepted and drops all others. `order` must grow.
   void push(std::string text, Worth worth, std::uint64_t order);

@@ -250,7 +250,7 @@ int main(int count, char** arguments) {
   int silent = 0;
   for (int i = 0; i < words; ++i) {
     if (!free[i]) continue;
-    const Word word(arguments + 1 + kFieldsOfAWord * i);
+    const Word word(&arguments[1 + kFieldsOfAWord * i]);
     const bool done = say(word);
     silent += !done;
     fprintf(stderr, "kphi-sentinel: kphi has died; %s: %s\n", word.device,

@@ -30,7 +30,7 @@ void DeterministicMotor::connect() {
   while (session_.state() == iq::Session::State::connecting) step_();
   if (session_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "connect", session_.failure());
   const bool newer = session_.identity().value<"coil_temperature_estimator.t_coil">().has_value();
-  parameters_ = iq::read_audit([this](auto asked) { return ask(std::move(asked)); }, newer);
+  parameters_ = iq::read_audit([this](const auto& asked) { return ask(asked); }, newer);
   (void)session_.take_events();  // that it is connected
 }
 
@@ -48,9 +48,9 @@ void DeterministicMotor::wake(const StopAsked&) {
   (void)session_.take_events();
 }
 
-std::vector<iq::Reply> DeterministicMotor::ask(std::vector<iq::Inquiry> asked) {
+std::vector<iq::Reply> DeterministicMotor::ask(const std::vector<iq::Inquiry>& asked) {
   if (session_.state() != iq::Session::State::ready) throw DeviceError("IQ module", "ask", failure());
-  session_.inquire(std::move(asked), clock_.now());
+  session_.inquire(asked, clock_.now());
   while (!session_.inquiries().done()) step_();
   return session_.inquiries().replies();
 }
@@ -109,7 +109,7 @@ std::optional<iq::StopReport> DeterministicMotor::stop_report() {
 }
 
 std::optional<Celsius> DeterministicMotor::coil_temperature() {
-  return ask_coil_temperature(parameters_, [this](auto asked) { return ask(std::move(asked)); });
+  return ask_coil_temperature(parameters_, [this](const auto& asked) { return ask(asked); });
 }
 
 std::vector<StreamEvent> DeterministicMotor::take_events() {

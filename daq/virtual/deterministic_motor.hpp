@@ -50,7 +50,7 @@ class DeterministicMotor final : public MotorLink {
   [[nodiscard]] std::string identity() const override { return session_.identity().summary(); }
 
  private:
-  [[nodiscard]] std::vector<iq::Reply> ask(std::vector<iq::Inquiry> asked);
+  [[nodiscard]] std::vector<iq::Reply> ask(const std::vector<iq::Inquiry>& asked);
   void watch_plug();
   void discard(Instant now);
 

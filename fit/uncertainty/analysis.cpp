@@ -27,7 +27,7 @@ ErrorSources sources_of(const Identification& identification, const Analysis& an
     k.push_back(row.k);
     errors.push_back(row.standard_error);
   }
-  return error_sources(std::move(k), std::move(errors));
+  return error_sources(std::move(k), errors);
 }
 
 bool has_errors(const CurveFit& curve) {

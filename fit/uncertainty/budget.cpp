@@ -202,7 +202,7 @@ ErrorSources error_sources(const Repeatability& repeatability, std::span<const S
   return sources;
 }
 
-ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_errors) {
+ErrorSources error_sources(std::vector<double> k, const std::vector<double>& standard_errors) {
   ErrorSource source{"given standard error", Evaluation::type_b, kUnitOfK};
   for (const double error : standard_errors) source.effects.push_back({error > 0 ? error : kUnknown, 1});
   return {std::move(k), {std::move(source)}};

@@ -105,6 +105,6 @@ struct ErrorSources {
                                          const BenchUncertainty& bench);
 
 /// Of a table of coefficients found elsewhere: its own standard errors.
-[[nodiscard]] ErrorSources error_sources(std::vector<double> k, std::vector<double> standard_errors);
+[[nodiscard]] ErrorSources error_sources(std::vector<double> k, const std::vector<double>& standard_errors);
 
 }  // namespace kphi::fit

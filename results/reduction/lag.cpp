@@ -103,7 +103,7 @@ struct Misfit {
   Eigen::Matrix2d curvature = Eigen::Matrix2d::Zero();
 };
 
-/// Of y, x, and, of four, x by delay and smoothing.
+/// Of y, x, and, of three and four, x by delay and smoothing.
 template <int N>
 struct Sums {
   using Values = Eigen::Matrix<double, N, 1>;
@@ -134,7 +134,7 @@ double thrust_in(const Transition& transition, std::ptrdiff_t bin) {
                  : transition.thrust[static_cast<std::size_t>(bin)];
 }
 
-/// `each`(bin, ω² as the thrust has it, and its derivatives by delay and smoothing, or 0 if it is not smoothed).
+/// `each`(bin, ω² as the thrust has it, and its derivatives by delay and smoothing; by this 0 if it is not smoothed).
 template <bool kSmoothed = true, class Each>
 void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t bins, Each&& each) {
   const Transition& transition = prepared.transition;
@@ -154,7 +154,7 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
     const double later = -(right.value - left.value) / h;
     left = right;
     if constexpr (!kSmoothed) {
-      each(i, mean, 0.0, 0.0);
+      each(i, mean, later, 0.0);
       continue;
     }
     const double x = value(mean);
@@ -164,19 +164,19 @@ void for_each_bin(const Prepared& prepared, const Shape& shape, std::ptrdiff_t b
   }
 }
 
-/// `kSmoothed`: with the derivatives; otherwise of a shape without smoothing.
-template <bool kSmoothed = true>
+/// With the first `kDerivatives` of the derivatives; unless with both, of a shape without smoothing.
+template <int kDerivatives>
 Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
   const Transition& transition = prepared.transition;
-  Sums<kSmoothed ? 4 : 2> sums;
+  Sums<2 + kDerivatives> sums;
   // Relative to the initial levels: sums of squares of the levels themselves would lose the digits.
   const double thrust = transition.thrust.front(), squared = transition.squared.front().value;
   const double level = std::isnan(thrust) ? 0 : thrust;
-  for_each_bin<kSmoothed>(prepared, shape, concerned(transition),
-                          [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
-                            const double y = thrust_in(transition, i);
-                            if (!std::isnan(y)) sums.add({y - level, x - squared, x_delay, x_smooth});
-                          });
+  for_each_bin<kDerivatives == 2>(prepared, shape, concerned(transition),
+                                  [&](std::ptrdiff_t i, double x, double x_delay, double x_smooth) {
+                                    const double y = thrust_in(transition, i);
+                                    if (!std::isnan(y)) sums.add({y - level, x - squared, x_delay, x_smooth});
+                                  });
   Misfit misfit;
   if (sums.n < 4) return misfit;
   const auto c = sums.centred();
@@ -188,10 +188,12 @@ Misfit misfit_of(const Prepared& prepared, const Shape& shape) {
     return misfit;
   }
   misfit.squares = yy - b * xy;
-  if constexpr (kSmoothed) {
-    const Eigen::Vector2d by_y = c.col(0).template tail<2>(), by_x = c.col(1).template tail<2>();
-    misfit.gradient = b * (by_y - b * by_x);
-    misfit.curvature = b * b * (c.template bottomRightCorner<2, 2>() - by_x * by_x.transpose() / xx);
+  if constexpr (kDerivatives > 0) {
+    constexpr int kN = kDerivatives;
+    const Eigen::Matrix<double, kN, 1> by_y = c.col(0).template tail<kN>(), by_x = c.col(1).template tail<kN>();
+    misfit.gradient.head<kN>() = b * (by_y - b * by_x);
+    misfit.curvature.topLeftCorner<kN, kN>() =
+        b * b * (c.template bottomRightCorner<kN, kN>() - by_x * by_x.transpose() / xx);
   }
   return misfit;
 }
@@ -204,10 +206,11 @@ struct Total {
   [[nodiscard]] double steps() const { return squared_weights > 0 ? weights * weights / squared_weights : 0; }
 };
 
-Total misfits(std::span<const Prepared> transitions, const Shape& shape) {
+/// `held`: of a shape without smoothing, and how it changes with the delay alone.
+Total misfits(std::span<const Prepared> transitions, const Shape& shape, bool held) {
   Total total;
   for (const Prepared& transition : transitions) {
-    const Misfit one = misfit_of(transition, shape);
+    const Misfit one = held ? misfit_of<1>(transition, shape) : misfit_of<2>(transition, shape);
     total.sum.squares += one.squares;
     total.sum.bins += one.bins;
     total.sum.gradient += one.gradient;
@@ -239,7 +242,9 @@ double best_of_grid(std::span<const Prepared> transitions) {
   double least = std::numeric_limits<double>::infinity();
   for (double delay = kEarliest + kGrid; delay < kLongest; delay += kGrid) {
     double squares = 0;
-    for (const Prepared& transition : transitions) squares += misfit_of<false>(transition, {delay, 0.0}).squares;
+    // From the last on: as a rule the fastest, whose misfit alone can be too large.
+    for (auto step = transitions.rbegin(); step != transitions.rend() && squares < least; ++step)
+      squares += misfit_of<0>(*step, {delay, 0.0}).squares;
     if (squares >= least) continue;
     least = squares;
     best = delay;
@@ -293,12 +298,12 @@ struct Fitted {
 
 /// Least squares from `shape` on; `held`: without smoothing.
 Fitted fitted(std::span<const Prepared> transitions, Shape shape, bool held) {
-  Total now = misfits(transitions, shape);
+  Total now = misfits(transitions, shape, held);
   double damping = 1e-3;
   for (int i = 0; i < kIterations; ++i) {
     const Shape next = clamped(shape + step_of(now.sum, shape, damping, held));
     const double moved = (next - shape).cwiseAbs().maxCoeff();
-    const Total then = misfits(transitions, next);
+    const Total then = misfits(transitions, next, held);
     if (then.sum.squares <= now.sum.squares) {
       shape = next;
       now = then;

@@ -112,7 +112,7 @@ void IqLine::carry(const IqReply& reply) {
     held_ = std::move(decision);
     return;
   }
-  emit(std::move(decision));
+  emit(decision);
   release(reply.at);
 }
 
@@ -151,7 +151,7 @@ void IqLine::act(std::size_t index, FaultDecision& decision) {
     passage.ready += fault.delay + from_seconds(script_.uniform() * to_seconds(fault.jitter));
 }
 
-void IqLine::emit(FaultDecision decision) {
+void IqLine::emit(const FaultDecision& decision) {
   const std::size_t entry = truth_.log.size();
   if (keep_ == Keep::replies) truth_.log.push_back(decision.reply);
   if (decision.dropped) {

@@ -116,7 +116,7 @@ class IqLine {
   void take_replies(Instant now);
   void carry(const IqReply& reply);
   void act(std::size_t index, FaultDecision& decision);
-  void emit(FaultDecision decision);
+  void emit(const FaultDecision& decision);
   void put(const FaultDecision& decision, std::size_t entry);
   void schedule(Passage passage);
   void release(Instant at);

@@ -240,13 +240,13 @@ SupplySlave::Pdu SupplySlave::write(const Pdu& pdu, Instant now) {
   const bool many = pdu[0] == kWriteMany;
   const unsigned first = word(pdu, 1), count = many ? word(pdu, 3) : 1;
   const std::size_t values = many ? 6 : 3;
-  const bool sized = pdu.size() == values + 2 * count && (!many || pdu[5] == 2 * count);
+  const bool sized = pdu.size() == values + std::size_t{2} * count && (!many || pdu[5] == std::size_t{2} * count);
   if (count < 1 || count > registers_.model().most_registers || !sized) return refuse(pdu[0], kIllegalValue);
   const bool heeded = many || registers_.read(static_cast<std::uint16_t>(first));
   const bool ignored = heeded && meet(FaultKind::supply_ignored_writes, now) != nullptr;
   for (unsigned i = 0; i < count; ++i) {
     const auto at = static_cast<std::uint16_t>(first + i);
-    const auto value = static_cast<std::uint16_t>(word(pdu, values + 2 * i));
+    const auto value = static_cast<std::uint16_t>(word(pdu, values + std::size_t{2} * i));
     if (first + i > 0xFFFF || !registers_.read(at)) return refuse(pdu[0], kIllegalAddress);
     truth_.writes.emplace_back(at, value);
     if (!ignored && !registers_.write(at, value)) return refuse(pdu[0], kIllegalAddress);
