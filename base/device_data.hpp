@@ -143,8 +143,9 @@ enum class EventKind : std::uint8_t {
   box_error_ended,        ///< its status is sound again; `records` samples were concerned
   motor_host_absent,      ///< this computer slept, or did not run kphi; the motor was let go
   motor_let_go,           ///< the module stopped driving by itself
+  sentinel_replaced,      ///< the process that would switch off after this program's death had died itself
 };
-inline constexpr std::array<const char*, 32> kEventNames{
+inline constexpr std::array<const char*, 33> kEventNames{
     // the load cell and its stream
     "restarted", "rebooted", "stalled", "stall_ended", "silent", "resumed", "box_trouble", "taken_over", "rdt_disabled",
     "unreachable", "near_range", "beyond_range", "range_trip", "unusable", "reconnected", "configuration_changed",
@@ -153,10 +154,11 @@ inline constexpr std::array<const char*, 32> kEventNames{
     "motor_connected", "motor_no_answer", "motor_reset", "motor_silent", "motor_coast_denied", "motor_lease_expired",
     "motor_port_lost", "motor_another_module", "motor_slow_round_trip",
     // supply and guard; then what came later
-    "supply_stop", "guard_trip", "box_error", "box_error_ended", "motor_host_absent", "motor_let_go"};
+    "supply_stop", "guard_trip", "box_error", "box_error_ended", "motor_host_absent", "motor_let_go",
+    "sentinel_replaced"};
 [[nodiscard]] constexpr const char* name_of(EventKind kind) { return kEventNames[static_cast<std::size_t>(kind)]; }
 
-/// Of the motor module; else of the load cell, the supply or the guard.
+/// Of the motor module; else of the load cell, the supply, the guard or the sentinel.
 [[nodiscard]] constexpr bool is_of_motor(EventKind kind) {
   return (kind >= EventKind::motor_connected && kind <= EventKind::motor_slow_round_trip) ||
          kind == EventKind::motor_host_absent || kind == EventKind::motor_let_go;

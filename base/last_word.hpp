@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace kphi {
 
@@ -15,7 +16,10 @@ struct LastWord {
   std::string bytes;
   std::string answer{};  ///< bytes that the device answers with; empty: it does not answer
   std::string from{};    ///< own address to speak from; empty: as the kernel routes
-  std::string lock{};    ///< file whose lock the device's user holds; whoever has it by then is not disturbed
+  /// Asks whether it has obeyed, and the answers that say so; empty: it cannot be asked.
+  std::string question{};
+  std::vector<std::string> proofs{};
+  std::string lock{};  ///< file whose lock the device's user holds; whoever has it by then is not disturbed
 };
 
 }  // namespace kphi

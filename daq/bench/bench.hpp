@@ -172,6 +172,11 @@ class Bench {
   virtual void wait_until(Instant when) = 0;
   /// Calls `work` while the handle lives: from a thread of its own, or from within wait_until.
   [[nodiscard]] virtual std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) = 0;
+  /// Why nothing would switch the devices off if this program were killed: then nothing may turn, and nobody may come
+  /// near. Empty: something would. Thread-safe.
+  [[nodiscard]] virtual std::string unprotected() const { return {}; }
+  /// Events of the bench itself since the last call. The guard's thread.
+  [[nodiscard]] virtual std::vector<StreamEvent> take_news() { return {}; }
   /// Writes the run files.
   [[nodiscard]] virtual results::FileLayer& files() = 0;
   /// How often the recorder syncs the run file, bench time.

@@ -4,6 +4,7 @@ namespace kphi::daq {
 
 StandAtRest::StandAtRest(Bench& bench, const std::function<bool()>& stop_asked) {
   guard_.emplace(bench, true);
+  if (const std::string why = bench.unprotected(); !why.empty()) throw SafetyStop(why);
   guard_->await_rest(stop_asked);
   has_power_ = !bench.switch_off_power();
   if (!has_power_) guard_.emplace(bench, false);

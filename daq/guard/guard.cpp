@@ -99,6 +99,7 @@ bool Guard::relay() {
   bool moved = samples_.move(bench_.load_cell(), inspect);
   for (auto& event : bench_.load_cell().take_events()) pending_events_.push_back(std::move(event));
   for (auto& event : bench_.motor().take_events()) pending_events_.push_back(std::move(event));
+  for (auto& event : bench_.take_news()) pending_events_.push_back(std::move(event));
   while (!pending_events_.empty() && events_.push(pending_events_.front())) {
     pending_events_.pop_front();
     moved = true;
@@ -183,6 +184,7 @@ void Guard::judge_links() {
   const auto judge = [this](Source source, const std::string& failure) {
     if (!failure.empty()) trip({failure, source, Watched::state, true});
   };
+  judge(Source::computer, bench_.unprotected());
   judge(Source::motor, bench_.motor().failure());
   judge(Source::load_cell, bench_.load_cell().failure());
   if (bench_.supply() != nullptr) judge(Source::supply, bench_.supply()->failure());

@@ -49,6 +49,7 @@ void RestGuard::await_rest(const std::function<bool()>& stop_asked) {
 void RestGuard::poll() noexcept {
   try {
     if (has_slept(bench_.clock())) trip(slept(bench_.clock()));
+    if (std::string why = bench_.unprotected(); !why.empty()) trip({std::move(why), Source::computer});
     take_readings();
     take_supply();
   } catch (...) {

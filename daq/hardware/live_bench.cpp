@@ -299,6 +299,18 @@ std::shared_ptr<void> LiveBench::run_periodically(const ThreadRole& role, std::f
   return std::make_shared<PeriodicThread>(role, std::move(work));
 }
 
+void LiveBench::restore_power(const StopAsked& stop_asked) {
+  if (const std::string why = unprotected(); !why.empty()) throw SafetyStop(why);
+  power_.restore(*motor_, clock_, stop_asked);
+}
+
+std::vector<StreamEvent> LiveBench::take_news() {
+  std::vector<StreamEvent> events;
+  for (const std::string& line : sentinel_.take_news())
+    events.push_back(event_at(clock_.now(), EventKind::sentinel_replaced, line));
+  return events;
+}
+
 Duration LiveBench::sync_interval() const { return clock_.stretched(kSyncWall); }
 
 void LiveBench::mounted(const std::string& propeller_id, double occlusion_deg) {

@@ -94,10 +94,12 @@ class LiveBench final : public Bench {
   [[nodiscard]] std::shared_ptr<void> run_periodically(const ThreadRole& role, std::function<void()> work) override;
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
+  [[nodiscard]] std::string unprotected() const override { return sentinel_.failure(); }
+  [[nodiscard]] std::vector<StreamEvent> take_news() override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   void hung(int axis, double newtons) override;
   [[nodiscard]] bool switch_off_power() override { return power_.off(*motor_); }
-  void restore_power(const StopAsked& stop_asked) override { power_.restore(*motor_, clock_, stop_asked); }
+  void restore_power(const StopAsked& stop_asked) override;
   [[nodiscard]] std::shared_ptr<void> keep_awake(std::string& why_not) override;
   [[nodiscard]] std::shared_ptr<void> keep_prompt(std::string& why_not) override;
 

@@ -362,7 +362,8 @@ void Sequence::show_events() {
   for (const StreamEvent& event : recorder_.take_events()) {
     if (event.kind == EventKind::stalled) stalled_ = event.text;
     if (event.kind == EventKind::stall_ended) stalled_.clear();
-    const std::string line = (is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
+    const bool says_so = event.kind == EventKind::sentinel_replaced;  // whose it is
+    const std::string line = (says_so ? "" : is_of_motor(event.kind) ? "motor: " : "load cell: ") + event.text;
     if (events_shown_ < kEventsShown) progress_.say(line);
     if (++events_shown_ == kEventsShown) progress_.say("further events of this run go to its file only: `kphi info`");
     if (ends_a_run(event.kind)) throw SafetyStop(StopWords{.cause = line, .motor_failure = MotorFailure::reported});

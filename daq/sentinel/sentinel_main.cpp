@@ -1,8 +1,9 @@
 // kphi-sentinel: waits for the end of the program that started it, and says the last words of one that did not come to
 // its end. Needs the C library alone, so that it is small and nothing in it can fail.
-// Usage: kphi-sentinel (DEVICE udp|tcp|serial|usb WHERE PORT|BAUD|PIPE BYTES ANSWER FROM LOCK)…, bytes in hexadecimal
-// digits, several addresses of one WHERE with commas. Its standard input is the line to that program: a byte releases
-// the sentinel, an end without one is a death.
+// Usage: kphi-sentinel (DEVICE udp|tcp|serial|usb WHERE PORT|BAUD|PIPE BYTES ANSWER QUESTION PROOFS FROM LOCK)…, bytes
+// in hexadecimal digits, several addresses of one WHERE and several PROOFS with commas. Its standard input is the line
+// to that program: "?" is answered with "!", which it also says when it begins to watch; "." releases it; an end
+// without that is a death.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>
@@ -25,7 +26,7 @@
 
 namespace {
 
-constexpr int kTries = 5, kFieldsOfAWord = 8, kMostWords = 8;
+constexpr int kTries = 5, kFieldsOfAWord = 10, kMostWords = 8;
 constexpr int kAnswer_ms = 700, kQuiet_ms = 20, kMostNoise_ms = 300, kConnect_ms = 700, kLockFreed_ms = 100;
 constexpr unsigned kTooLong_s = 20;
 
@@ -36,9 +37,10 @@ struct Bytes {
 
 int digit(char c) { return c >= 'a' ? c - 'a' + 10 : c - '0'; }
 
+/// Up to a comma.
 Bytes from_hex(const char* text) {
   Bytes bytes;
-  for (; text[0] != 0 && text[1] != 0 && bytes.n < sizeof bytes.of; text += 2)
+  for (; text[0] != 0 && text[0] != ',' && text[1] != 0 && bytes.n < sizeof bytes.of; text += 2)
     bytes.of[bytes.n++] = static_cast<unsigned char>(digit(text[0]) * 16 + digit(text[1]));
   return bytes;
 }
@@ -51,13 +53,16 @@ struct Word {
         number(static_cast<unsigned>(strtoul(fields[3], nullptr, 10))),
         bytes(from_hex(fields[4])),
         answer(from_hex(fields[5])),
-        from(fields[6]),
-        lock(fields[7]) {}
+        question(from_hex(fields[6])),
+        proofs(fields[7]),
+        from(fields[8]),
+        lock(fields[9]) {}
   const char* device;
   const char* wire;
   const char* where;
   unsigned number;
-  Bytes bytes, answer;
+  Bytes bytes, answer, question;
+  const char* proofs;
   const char* from;
   const char* lock;
 };
@@ -68,6 +73,13 @@ bool within(int file, short event, int limit_ms) {
   do ready = poll(&wanted, 1, limit_ms);
   while (ready < 0 && errno == EINTR);
   return ready > 0;
+}
+
+/// Takes what is still on its way.
+void hush(int file) {
+  unsigned char rubbish[256];
+  for (int waited = 0; waited < kMostNoise_ms && within(file, POLLIN, kQuiet_ms); waited += kQuiet_ms)
+    if (read(file, rubbish, sizeof rubbish) <= 0) break;
 }
 
 speed_t speed_of(unsigned baud) {
@@ -90,10 +102,7 @@ int opened_serial(const Word& word) {
   settings.c_cflag |= CLOCAL | CREAD;
   cfsetspeed(&settings, speed_of(word.number));
   tcsetattr(port, TCSANOW, &settings);
-  // An answer to the dead program may still be on its way.
-  unsigned char rubbish[256];
-  for (int waited = 0; waited < kMostNoise_ms && within(port, POLLIN, kQuiet_ms); waited += kQuiet_ms)
-    if (read(port, rubbish, sizeof rubbish) <= 0) break;
+  hush(port);  // an answer to the dead program may still be on its way
   return port;
 }
 
@@ -181,16 +190,26 @@ bool told_over_usb(const Word& word) {
   return sent == static_cast<int>(message.n);
 }
 
-bool answered(int file, const Bytes& wanted) {
+bool holds(const Bytes& seen, const Bytes& wanted) { return memmem(seen.of, seen.n, wanted.of, wanted.n) != nullptr; }
+
+enum class Heard { nothing, another, wanted };
+
+/// Whether it answers with one of these, written with commas.
+Heard heard(int file, const char* wanted) {
   Bytes seen;
   while (seen.n < sizeof seen.of && within(file, POLLIN, kAnswer_ms)) {
     const ssize_t n = read(file, seen.of + seen.n, sizeof seen.of - seen.n);
-    if (n <= 0) return false;
+    if (n <= 0) break;
     seen.n += static_cast<size_t>(n);
-    if (memmem(seen.of, seen.n, wanted.of, wanted.n) != nullptr) return true;
+    for (const char* one = wanted; one != nullptr; one = strchr(one, ',')) {
+      one += *one == ',';
+      if (holds(seen, from_hex(one))) return Heard::wanted;
+    }
   }
-  return false;
+  return seen.n > 0 ? Heard::another : Heard::nothing;
 }
+
+bool sent(int file, const Bytes& bytes) { return write(file, bytes.of, bytes.n) == static_cast<ssize_t>(bytes.n); }
 
 /// Takes the lock that its death frees, before the next program can: that one waits. The kernel frees it a little later
 /// than it ends the line. False: another program has it.
@@ -204,14 +223,38 @@ bool takes(const char* lock) {
   return true;  // held to the end of this process
 }
 
-/// Whether the device has said that it obeys; of one that does not answer, whether the bytes have left.
-bool say(const Word& word) {
+enum class Outcome {
+  silent,  ///< nothing was heard of it, or it could not be told
+  still,   ///< it says that it is still on
+  told,    ///< the bytes have left, or were acknowledged; it cannot be asked
+  off,     ///< it says that it is off
+};
+
+/// The order, on an open line, and what the device says of itself afterwards.
+Outcome say_to(int file, const Word& word, const char* answer) {
+  if (!sent(file, word.bytes) || (word.answer.n > 0 && heard(file, answer) != Heard::wanted)) return Outcome::silent;
+  if (word.question.n == 0) return Outcome::told;
+  hush(file);  // the rest of its answer
+  if (!sent(file, word.question)) return Outcome::silent;
+  switch (heard(file, word.proofs)) {
+    case Heard::wanted:
+      return Outcome::off;
+    case Heard::another:
+      return Outcome::still;
+    case Heard::nothing:
+      break;
+  }
+  return Outcome::silent;
+}
+
+/// The best that became of it.
+Outcome say(const Word& word, const char* answer) {
   const bool serial = strcmp(word.wire, "serial") == 0, udp = strcmp(word.wire, "udp") == 0;
   const int addresses = udp || strcmp(word.wire, "tcp") == 0 ? addresses_of(word.where) : 1;
-  bool told = false;
+  Outcome best = Outcome::silent;
   for (int attempt = 0; attempt < kTries || attempt % addresses != 0; ++attempt) {
     if (strcmp(word.wire, "usb") == 0) {
-      if (told_over_usb(word)) return true;
+      if (told_over_usb(word)) return Outcome::told;
       poll(nullptr, 0, kQuiet_ms);
       continue;
     }
@@ -221,42 +264,65 @@ bool say(const Word& word) {
       poll(nullptr, 0, kQuiet_ms);
       continue;
     }
-    const bool sent = write(file, word.bytes.of, word.bytes.n) == static_cast<ssize_t>(word.bytes.n);
-    const bool done = sent && (word.answer.n == 0 || answered(file, word.answer));
+    const Outcome outcome = say_to(file, word, answer);
     close(file);
-    told = told || done;
+    if (outcome > best) best = outcome;
     // A datagram does not tell whether anybody was there: each address gets one.
-    if (done && (!udp || which + 1 == addresses)) return true;
+    if (outcome >= Outcome::told && (!udp || which + 1 == addresses)) break;
   }
-  return told;
+  return best;
+}
+
+const char* words_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::silent:
+      return "DOES NOT ANSWER, switch it off by hand";
+    case Outcome::still:
+      return "was told to switch off and IS STILL ON, switch it off by hand";
+    case Outcome::told:
+      return "told to stop";
+    case Outcome::off:
+      return "switched off";
+  }
+  return "";
+}
+
+/// Returns when that program has released it, true, or has died.
+bool is_released() {
+  constexpr char kHere = '!';
+  (void)!write(STDIN_FILENO, &kHere, 1);
+  for (char heard = 0;;) {
+    const ssize_t n = read(STDIN_FILENO, &heard, 1);
+    if (n < 0 && errno == EINTR) continue;
+    if (n == 1 && heard == '?') {
+      (void)!write(STDIN_FILENO, &kHere, 1);
+      continue;
+    }
+    return n == 1;
+  }
 }
 
 }  // namespace
 
 int main(int count, char** arguments) {
-  for (const int sent : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU}) signal(sent, SIG_IGN);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGTSTP, SIGTTIN, SIGTTOU})
+    signal(number, SIG_IGN);
   syscall(SYS_close_range, 3u, ~0u, 0u);  // what that program held: ports and locks, which its death must free
   (void)!chdir("/");
-  char released = 0;
-  ssize_t n = 0;
-  do n = read(STDIN_FILENO, &released, 1);
-  while (n < 0 && errno == EINTR);
-  if (n == 1) return 0;
+  if (is_released()) return 0;
 
   alarm(kTooLong_s);
   const int words = (count - 1) / kFieldsOfAWord < kMostWords ? (count - 1) / kFieldsOfAWord : kMostWords;
   bool free[kMostWords];
-  for (int i = 0; i < words; ++i) free[i] = takes(arguments[1 + kFieldsOfAWord * i + kFieldsOfAWord - 1]);
-  int silent = 0;
+  for (int i = 0; i < words; ++i) free[i] = takes(arguments[kFieldsOfAWord * (i + 1)]);
+  int failed = 0;
   for (int i = 0; i < words; ++i) {
     if (!free[i]) continue;
-    const Word word(&arguments[1 + kFieldsOfAWord * i]);
-    const bool done = say(word);
-    silent += !done;
-    fprintf(stderr, "kphi-sentinel: kphi has died; %s: %s\n", word.device,
-            !done                ? "DOES NOT ANSWER, switch it off by hand"
-            : word.answer.n == 0 ? "told to stop"
-                                 : "switched off");
+    char** const fields = arguments + 1 + kFieldsOfAWord * i;
+    const Word word(fields);
+    const Outcome outcome = say(word, fields[5]);
+    failed += outcome < Outcome::told;
+    fprintf(stderr, "kphi-sentinel: kphi has died; %s: %s\n", word.device, words_of(outcome));
   }
-  return silent == 0 ? 0 : 1;
+  return failed == 0 ? 0 : 1;
 }

@@ -29,8 +29,10 @@ class Line {
   /// The answer without its end of line.
   [[nodiscard]] virtual std::string query(std::string_view command) = 0;
   [[nodiscard]] virtual const std::string& name() const noexcept = 0;
-  /// This command to the `device`, for another process to say; nullopt where only this process can.
-  [[nodiscard]] virtual std::optional<LastWord> last_word(std::string_view, const std::string&) const {
+  /// This command to the `device`, for another process to say, and a question to be asked afterwards, where that
+  /// process can read an answer; nullopt where only this process can speak.
+  [[nodiscard]] virtual std::optional<LastWord> last_word(std::string_view, std::string_view,
+                                                          const std::string&) const {
     return std::nullopt;
   }
 };
@@ -45,8 +47,11 @@ class Tcp final : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }
-  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, const std::string& device) const override {
-    return LastWord{device, LastWord::Wire::tcp, host_, port_, std::string(command) + "\n"};
+  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, std::string_view question,
+                                                  const std::string& device) const override {
+    LastWord word{device, LastWord::Wire::tcp, host_, port_, std::string(command) + "\n"};
+    word.question = std::string(question) + "\n";
+    return word;
   }
 
  private:
@@ -74,7 +79,8 @@ class Usbtmc : public Line {
   void write(std::string_view command) override;
   [[nodiscard]] std::string query(std::string_view command) override;
   [[nodiscard]] const std::string& name() const noexcept override { return transport_.name(); }
-  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, const std::string& device) const override;
+  [[nodiscard]] std::optional<LastWord> last_word(std::string_view command, std::string_view question,
+                                                  const std::string& device) const override;
 
  private:
   void find_endpoints();

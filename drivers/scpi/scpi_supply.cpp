@@ -62,7 +62,8 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   if (fields[1].empty()) fail("*IDN?", "\"" + who + "\" does not name a model", "check that this is a SCPI instrument");
   dialect_ = &dialect_of(who);
   identity_ = {fmt::format("supply {} on {}", fields[1], line_->name()), fields[1], fields[2], fields[3]};
-  identity_.off = line_->last_word(kOff, identity_.device);
+  identity_.off = line_->last_word(kOff, "OUTP?", identity_.device);
+  if (identity_.off && !identity_.off->question.empty()) identity_.off->proofs = {"0\n", "0\r", "OFF"};
   forget_errors();
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");

@@ -52,7 +52,7 @@ Usbtmc::Usbtmc(usb::Transport& transport, Timeout timeout) : transport_(transpor
   take_remote_control();
 }
 
-std::optional<LastWord> Usbtmc::last_word(std::string_view command, const std::string& device) const {
+std::optional<LastWord> Usbtmc::last_word(std::string_view command, std::string_view, const std::string& device) const {
   const std::string file = transport_.device_file();
   if (file.empty()) return std::nullopt;
   const auto message = usbtmc::message_out(1, std::string(command) + "\n");

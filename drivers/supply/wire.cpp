@@ -145,6 +145,24 @@ const Model* first_model(auto&& fits) {
   return found == models().end() ? nullptr : &*found;
 }
 
+std::string bytes_of(std::initializer_list<unsigned> values) {
+  std::string bytes;
+  for (const unsigned value : values) bytes.push_back(static_cast<char>(value));
+  return bytes;
+}
+
+/// MODBUS over serial line, 6.2.2: the checksum's low byte first.
+std::string on_serial(const std::string& frame) {
+  boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;
+  crc.process_bytes(frame.data(), frame.size());
+  return frame + bytes_of({crc.checksum() & 0xFFu, static_cast<unsigned>(crc.checksum()) >> 8u});
+}
+
+/// Transaction, Modbus, bytes that follow (MODBUS Messaging on TCP/IP, 3.1.3).
+std::string on_tcp(unsigned transaction, const std::string& frame) {
+  return bytes_of({0x4Bu, transaction, 0u, 0u, 0u, static_cast<unsigned>(frame.size())}) + frame;
+}
+
 }  // namespace
 
 const std::vector<Model>& models() {
@@ -187,21 +205,22 @@ const Model* find_model(const RegisterMap& map, std::uint16_t id) {
 }
 
 LastWord off_word(const Address& address, const RegisterMap& map, std::string device) {
-  const unsigned at = static_cast<std::uint16_t>(map.output);
-  std::string order;
-  for (const unsigned byte : {static_cast<unsigned>(address.slave), 0x06u, at >> 8u, at & 0xFFu, 0u, 0u})
-    order.push_back(static_cast<char>(byte));
+  const unsigned at = static_cast<std::uint16_t>(map.output), slave = static_cast<unsigned>(address.slave);
+  const std::string order = bytes_of({slave, 0x06u, at >> 8u, at & 0xFFu, 0u, 0u});
+  const std::string question = bytes_of({slave, 0x03u, at >> 8u, at & 0xFFu, 0u, 1u});
+  const std::string is_off = bytes_of({slave, 0x03u, 2u, 0u, 0u});
+  LastWord word{std::move(device), LastWord::Wire::serial, address.device, address.baud, on_serial(order), order};
+  word.question = on_serial(question);
+  word.proofs = {on_serial(is_off)};
   if (address.wire == Address::Wire::tcp) {
-    const std::string header("\x4B\x50\0\0\0\x06",
-                             6);  // transaction, Modbus, six bytes (MODBUS Messaging on TCP/IP, 3.1.3)
-    return {std::move(device), LastWord::Wire::tcp, address.tcp.host, address.tcp.port, header + order, order};
+    word.wire = LastWord::Wire::tcp;
+    word.where = address.tcp.host;
+    word.number = address.tcp.port;
+    word.bytes = on_tcp(1, order);
+    word.question = on_tcp(2, question);
+    word.proofs = {on_tcp(2, is_off)};
   }
-  boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;  // MODBUS over serial line, 6.2.2: low byte first
-  crc.process_bytes(order.data(), order.size());
-  std::string frame = order;
-  frame.push_back(static_cast<char>(crc.checksum() & 0xFFu));
-  frame.push_back(static_cast<char>(crc.checksum() >> 8u));
-  return {std::move(device), LastWord::Wire::serial, address.device, address.baud, frame, order};
+  return word;
 }
 
 SupplyProtection protection_of(const RegisterMap& map, std::uint16_t code) noexcept {

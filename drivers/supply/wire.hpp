@@ -105,7 +105,8 @@ struct Model {
 [[nodiscard]] const Model* find_model(std::string_view name);
 [[nodiscard]] const Model* find_model(const RegisterMap& map, std::uint16_t id);
 
-/// Switches the output of the `device` off, and how it acknowledges that (function 0x06, which echoes).
+/// Switches the output of the `device` off, how it acknowledges that (function 0x06, which echoes), and how its
+/// register is read back (0x03).
 [[nodiscard]] LastWord off_word(const Address& address, const RegisterMap& map, std::string device);
 
 /// The device's word for why it has switched off.

@@ -18,11 +18,14 @@ constexpr auto kLimit = std::chrono::seconds(1);
 
 bool is_safe(const nlohmann::json& now) { return now["supply"]["output"] == false && now["streaming"] == false; }
 
-/// Of the sentinel that the program has started; 0: none yet.
+/// Of the sentinel that a thread of the program has started; 0: none yet.
 int sentinel_of(int program) {
-  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", program));
-  int child = 0;
-  return children >> child ? child : 0;
+  std::error_code none;
+  for (const auto& thread : std::filesystem::directory_iterator(fmt::format("/proc/{}/task", program), none)) {
+    std::ifstream children(thread.path() / "children");
+    if (int child = 0; children >> child) return child;
+  }
+  return 0;
 }
 
 double resident_mb(int process) {
@@ -70,7 +73,9 @@ TEST_P(KilledWithPower, LeavesTheSupplyOffTheBoxQuietAndTheMotorCoasting) {
   }
   EXPECT_LT(longest_s, std::chrono::duration<double>(kLimit).count());
   // Nearly all that a sanitizer's takes is the sanitizer's.
-  if (!kphi_is_of_another_build()) EXPECT_LT(memory_mb, kMost_mb);
+  if (!kphi_is_of_another_build()) {
+    EXPECT_LT(memory_mb, kMost_mb);
+  }
   EXPECT_GT(powered, number / 4) << "enough of them with the supply on";
   const Account account = bench.account();
   for (const double at : kills_ms)
@@ -112,6 +117,30 @@ TEST_F(Sentinel, DoesNotMindWhatEndsItsProgramFromATerminal) {
   ASSERT_GT(sentinel_, 0);
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) EXPECT_EQ(::kill(sentinel_, number), 0);
   EXPECT_EQ(run_.wait(), 0) << run_.err();
+}
+
+TEST_F(Sentinel, ThatIsKilledIsReplacedAndTheRunSaysSo) {
+  ASSERT_GT(sentinel_, 0);
+  ASSERT_EQ(::kill(sentinel_, SIGKILL), 0);
+  run_.wait_for("sentinel: it was killed by signal 9; another one watches now");
+  ASSERT_GT(sentinel_of(run_.pid()), 0);
+  run_.signal(SIGKILL);
+  EXPECT_TRUE(safely(bench_.await(is_safe))) << "the other one has done it";
+}
+
+TEST_F(Sentinel, ThatCannotBeReplacedStopsTheMotor) {
+  for (bool more = true; more; more = run_.hear(std::chrono::milliseconds(1)))
+    if (const int sentinel = sentinel_of(run_.pid())) ::kill(sentinel, SIGKILL);
+  EXPECT_EQ(run_.wait(), 4) << run_.err();
+  EXPECT_NE(run_.err().find("install kphi again"), std::string::npos) << run_.err();
+  EXPECT_TRUE(safely(bench_.account().ends_without_power()));
+}
+
+TEST_F(Sentinel, DoesNotSaySwitchedOffOfASupplyThatIgnoresItsOrder) {
+  (void)bench_.fault("kind=supply_ignored_writes for_s=1000");
+  run_.signal(SIGKILL);
+  run_.wait_for("IS STILL ON, switch it off by hand");
+  EXPECT_EQ(bench_.status()["supply"]["output"], true);
 }
 
 }  // namespace kphi::test::sentinel_test
