@@ -274,6 +274,11 @@ ExitCode run_fit(const FitRequest& request) {
     throw ConfigurationError(request.path + ": --raw needs the runs of a campaign folder");
   Fitted fitted{identify_input(input, request), {}};
   const Identification& identification = fitted.identification;
+  if (const double K_T = identification.thrust_coefficient().value; !(K_T > 0))
+    throw DataRejected(fmt::format(
+        "{}: K_T is {:.3e} N/(rad/s)^2, not positive, which is no result: mirror thrust_axis in the bench file, or "
+        "import with --reverse-thrust",
+        request.path, K_T));
   const fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const AnalysisOptions options = analysis_options(request, input, identification);

@@ -10,6 +10,7 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "daq/audit/bench_audit.hpp"
+#include "daq/guard/cell_trust.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "results/reduction/reduction.hpp"

@@ -14,7 +14,7 @@
 #include "base/finding.hpp"
 #include "base/thread.hpp"
 #include "compensation/units.hpp"
-#include "daq/guard/run_stopped.hpp"
+#include "daq/bench/stop_asked.hpp"
 #include "drivers/ambient/air.hpp"
 #include "drivers/iq/session/stopping.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"

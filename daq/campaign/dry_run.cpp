@@ -18,17 +18,6 @@
 namespace kphi::daq {
 namespace {
 
-constexpr double kInch = 5;  // diameter of those below
-
-struct Measured {
-  int blades;
-  double low, high;  // N/(rad/s)²: medians per propeller
-};
-
-// Eight 5-inch propellers on ten motors at two voltages, Series 1520 stand: github.com/StrawsonDesign/
-// motor_propeller_testing; k by least squares through the origin.
-constexpr std::array<Measured, 3> kFiveInch{{{2, 1.02e-6, 1.16e-6}, {3, 1.12e-6, 1.38e-6}, {4, 1.54e-6, 1.54e-6}}};
-
 using nlohmann::json;
 using profiles::Campaign;
 
@@ -77,7 +66,7 @@ class Checks {
 
   void thrust() {
     const double limit = limit_of(Watched::thrust);
-    const auto prior = thrust_prior(campaign_.propeller);
+    const auto prior = profiles::thrust_prior(campaign_.propeller);
     if (!prior)
       return tell("thrust", fmt::format("limit {:g} N; no published thrust data for such a propeller", limit));
     const double low = thrust_at(prior->low, top_speed(campaign_)).value();
@@ -260,19 +249,6 @@ json to_json(const profiles::PlannedRun& run, const Campaign& campaign) {
 }
 
 }  // namespace
-
-std::optional<ThrustPrior> thrust_prior(const profiles::Propeller& propeller) {
-  const double ratio = propeller.diameter_in / kInch;
-  if (ratio < 0.9 || ratio > 1.3) return std::nullopt;  // beyond, D⁴ is no longer to be trusted
-  for (const Measured& measured : kFiveInch) {
-    if (measured.blades != propeller.blades) continue;
-    const double scale = std::pow(ratio, 4);
-    return ThrustPrior{ThrustCoefficient(measured.low * scale), ThrustCoefficient(measured.high * scale),
-                       fmt::format("{}-blade 5-inch propellers on a Series 1520 stand{}", propeller.blades,
-                                   ratio == 1 ? "" : ", times (D / 5 in)^4")};
-  }
-  return std::nullopt;
-}
 
 std::ptrdiff_t DryRun::refused() const {
   return std::ranges::count_if(checks,

@@ -14,19 +14,10 @@
 #include "profiles/answers.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
+#include "profiles/thrust_prior.hpp"
 #include "results/file_layer.hpp"
 
 namespace kphi::daq {
-
-/// The thrust to expect of a propeller that was never measured, without occlusion.
-struct ThrustPrior {
-  ThrustCoefficient low;
-  ThrustCoefficient high;
-  std::string source;
-};
-
-/// By diameter and number of blades; nullopt without a published measurement. A plausibility check, not a result.
-[[nodiscard]] std::optional<ThrustPrior> thrust_prior(const profiles::Propeller& propeller);
 
 /// One check of a plan. A note: passed, if it was judged. A fault: the campaign would be refused or stopped.
 struct PlanCheck {

@@ -54,6 +54,9 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
       status_watch_(bench.load_cell().box() ? bench.load_cell().box()->kind : netbox::Product::net_box,
                     bench.load_cell().records_together(), scale.sample_rate_hz),
       device_rate_hz_(scale.device_rate_hz),
+      spin_(config.iq.spin),
+      frozen_watch_(scale.sample_rate_hz),
+      thrust_watch_(scale.sample_rate_hz),
       fresh_{bench.clock().stretched(kFreshWall) +
                  from_seconds(3 * bench.load_cell().records_together() / scale.sample_rate_hz),
              bench.clock().stretched(kFreshWall) + kFreshMotor},
@@ -127,7 +130,11 @@ void Guard::hold(Watched watched, double value) {
 
 void Guard::take_marks() {
   results::PhaseMark mark;
-  while (marks_.pop(mark)) observer_.take(mark);
+  while (marks_.pop(mark)) {
+    observer_.take(mark);
+    frozen_watch_.learn(mark.phase == results::Phase::zero_before);
+    thrust_watch_.begin(RadPerSec(mark.phase == results::Phase::step ? mark.speed_rad_s : 0));
+  }
 }
 
 void Guard::judge(const LoadCellRecord& sample) {
@@ -135,6 +142,20 @@ void Guard::judge(const LoadCellRecord& sample) {
   judge_gap(sample);
   judge_status(sample);
   observer_.take(sample);
+  judge_trust(sample);
+}
+
+/// Of a cell that says that all is well: an axis at the end of its range repeats one value, too.
+void Guard::judge_trust(const LoadCellRecord& sample) {
+  if (sample.status != 0) return;
+  if (const auto axis = frozen_watch_.take(sample.counts))
+    trip({fmt::format("load cell: {} repeats one value, {} samples so far, which its noise in the zero cannot do",
+                      kAxisNames[*axis], *frozen_watch_.limit(*axis)),
+          Source::load_cell, Watched::frozen});
+  if (!observer_.is_settled(sample.arrival_ns)) return;
+  if (!thrust_watch_.add(observer_.thrust_n(), observer_.torque_nm())) return;
+  if (auto why = thrust_watch_.doubt(spin_, expected_.read()))
+    trip({std::move(*why), Source::load_cell, Watched::no_thrust});
 }
 
 /// A faulty box stops the run also at rest, since the zeros are taken from these samples; saturation and network

@@ -24,6 +24,7 @@
 
 #include "base/published.hpp"
 #include "daq/bench/bench.hpp"
+#include "daq/guard/cell_trust.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/observation.hpp"
 #include "daq/guard/relay.hpp"
@@ -57,6 +58,8 @@ class Guard final {
   void mark(const results::PhaseMark& mark);
   /// Mean of each axis without load, N and N m. Thrust and torque are judged from then on.
   void take_zero(const std::array<double, 6>& mean) noexcept { observer_.take_zero(mean); }
+  /// From then on a step without it stops the motor.
+  void expect_thrust(const ThrustExpectation& expected) noexcept { expected_.publish(expected); }
   /// Until then sag, rise and current limit of the supply are excused: the speed is changing.
   void settles_until(Instant when) noexcept { observer_.settles_until(when); }
   /// Heartbeat of the run thread; to be called before every order that turns the motor. Throws SafetyStop after a trip,
@@ -102,6 +105,7 @@ class Guard final {
   void judge_pause(Instant now);
   void judge_recorder(Instant now);
   void judge_gap(const LoadCellRecord& sample);
+  void judge_trust(const LoadCellRecord& sample);
   [[nodiscard]] double wall_seconds_since(std::int64_t at_ns, Instant now) const;
 
   Bench& bench_;
@@ -111,6 +115,10 @@ class Guard final {
   Observer observer_;
   StatusWatch status_watch_;
   const double device_rate_hz_;
+  const int spin_;
+  FrozenWatch frozen_watch_;
+  ThrustWatch thrust_watch_;
+  Published<ThrustExpectation> expected_;
   const Freshness fresh_;
   std::optional<std::uint32_t> last_sequence_;  ///< of the load cell
   Stream load_cell_stream_, motor_stream_, supply_stream_;

@@ -37,7 +37,9 @@ enum class Watched : std::uint8_t {
   supply_age,
   pause,
   recorder_pause,
-  samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; this and the next two have no row
+  samples_missing,  ///< s of the load cell's stream in a row, while the motor turns; this and those below have no row
+  frozen,           ///< an axis of the load cell repeats one value that its noise cannot repeat
+  no_thrust,        ///< no thrust, or of the wrong sign, at a speed that gives some
   sleep,            ///< of this computer, however short
   state,            ///< no quantity: trouble that a device reports
 };

@@ -42,6 +42,9 @@ std::string next_move(const Trip& trip) {
   if (trip.source == Source::computer && trip.watched != Watched::sleep) return kCheckComputer;
   if (trip.watched < Watched::samples_missing) return row_of(trip.watched).next_move;
   if (trip.watched == Watched::samples_missing) return kCheckBox;
+  if (trip.watched == Watched::frozen)
+    return "switch the load cell off and on, check its cable; `kphi devices` shows its noise";
+  if (trip.watched == Watched::no_thrust) return "see what `kphi spin` says at a low speed";
   if (trip.watched == Watched::sleep)
     return "disable sleep, keep the lid open, then look at the stand before you continue";
   return kCheckStand;

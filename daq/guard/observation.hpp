@@ -127,6 +127,9 @@ class Observer {
   void take_zero(const std::array<double, 6>& mean) noexcept;
   /// Until then the speed is changing, and what a change brings is excused. Any thread.
   void settles_until(Instant when) noexcept { settled_from_ = when.count(); }
+  /// Of the newest sample, mean of 5 ms, zero subtracted.
+  [[nodiscard]] double thrust_n() const noexcept { return newest_.thrust_n; }
+  [[nodiscard]] double torque_nm() const noexcept { return newest_.torque_nm; }
   [[nodiscard]] bool is_settled(Nanoseconds at) const noexcept { return at >= settled_from_; }
 
   /// The newest readings; of each guarded quantity the value closest to its limit since the last call.

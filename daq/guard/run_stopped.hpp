@@ -3,11 +3,11 @@
 
 #include <cstdint>
 #include <exception>
-#include <functional>
 #include <string>
 #include <utility>
 
 #include "base/error.hpp"
+#include "daq/bench/stop_asked.hpp"
 
 namespace kphi::daq {
 
@@ -53,10 +53,7 @@ class Interrupted : public RunStopped {
   explicit Interrupted(const std::string& cause) : Interrupted(StopWords{.cause = cause}) {}
 };
 
-/// Whether a person or the system asks the program to stop. The runner's thread asks after each wait, and before
-/// anything is switched on.
-using StopAsked = std::function<bool()>;
-/// Throws Interrupted if so. `when`: "before anything was switched on".
+/// Throws Interrupted if a stop is asked for. `when`: "before anything was switched on".
 void require_no_stop(const StopAsked& stop_asked, const char* when);
 
 /// Words of any exception; an exception other than RunStopped has only a cause, its message.

@@ -12,6 +12,7 @@
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/speed_cap.hpp"
 #include "daq/run/step_watch.hpp"
+#include "profiles/thrust_prior.hpp"
 #include "results/reduction/quality_flags.hpp"
 
 namespace kphi::daq {
@@ -28,6 +29,15 @@ constexpr Duration kAftermath = std::chrono::seconds(3);
 constexpr Duration kLastReadingWall = std::chrono::milliseconds(500);  // of a supply whose output is off
 constexpr int kBiasAttempts = 3;
 constexpr int kEventsShown = 10;
+
+constexpr double kThrustFloor_n = 0.1, kThrustFloorOfNoise = 5;
+constexpr double kMostOccluded_deg = 180;  // beyond it too little thrust may be left to expect any
+
+ThrustExpectation expected_thrust(const RunOrder& order, double noise_n) {
+  const auto prior = profiles::thrust_prior(order.campaign.propeller);
+  const bool expects = prior && order.mounted.occlusion_deg() <= kMostOccluded_deg;
+  return {std::max(kThrustFloor_n, kThrustFloorOfNoise * noise_n), expects ? prior->low.value() / 2 : 0};
+}
 
 /// An answer to the question why the box is silent, or the end of its silence.
 bool explains_silence(EventKind kind) {
@@ -55,8 +65,11 @@ void Sequence::run() {
   if (order_.campaign.box_bias) take_box_bias();
   hold_zero(Phase::zero_before);
   require_rest();
-  guard_.take_zero(recorder_.measured().mean);
-  zero_n_ = recorder_.measured().mean[static_cast<std::size_t>(order_.config.thrust_axis)];
+  const netbox::ZeroMeasurement zero = recorder_.measured();
+  const auto axis = static_cast<std::size_t>(order_.config.thrust_axis);
+  guard_.take_zero(zero.mean);
+  zero_n_ = zero.mean[axis];
+  if (order_.steering == nullptr) guard_.expect_thrust(expected_thrust(order_, zero.standard_deviation[axis]));
   spin();
   wait_for_standstill();
   hold_zero(Phase::zero_after);
@@ -323,6 +336,11 @@ void Sequence::require_rest() {
   const netbox::ZeroMeasurement zero = recorder_.measured();
   if (zero.records < 2)
     throw DeviceError("Net Box", "take the zero", "no valid sample arrived", "check the box's status: `kphi devices`");
+  if (!(zero.standard_deviation[axis] > 0))
+    throw DeviceError(
+        "load cell", "take the zero",
+        fmt::format("{} repeated one value in all {} samples: it is frozen", kAxisNames[axis], zero.records),
+        "switch it off and on, check its cable; `kphi devices` shows its noise");
   if (const auto why = noise(zero, axis, results::kNoisyZero))
     throw DeviceError("Net Box", "take the zero", *why, results::kZeroNextMove);
 }

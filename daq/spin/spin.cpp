@@ -3,15 +3,14 @@
 #include <cmath>
 
 #include "daq/campaign/at_the_stand.hpp"
+#include "daq/guard/cell_trust.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::daq {
 namespace {
 
-constexpr double kThrustSeen = 0.05;    // N: less says nothing of a sign
-constexpr double kTorqueSeen = 0.0005;  // N m
-constexpr int kTicks = 100;             // at a held speed, before its signs are judged
+constexpr int kTicks = 100;  // at a held speed, before its signs are judged
 
 /// Tells once what the signs say.
 class SignWatch final : public Progress {
@@ -44,21 +43,6 @@ std::shared_ptr<void> kept(std::shared_ptr<void> handle, const std::string& why_
 }
 
 }  // namespace
-
-std::optional<std::string> doubt_about_signs(double thrust_n, double torque_nm, int spin) {
-  // Written so that what is not a number says nothing.
-  if (!(std::abs(thrust_n) >= kThrustSeen) || !(std::abs(torque_nm) >= kTorqueSeen)) return std::nullopt;
-  const bool pulls = thrust_n > 0, opposes = torque_nm * spin < 0;
-  if (pulls && opposes) return std::nullopt;
-  if (!pulls && !opposes)
-    return "thrust is negative, and so is the sense of the torque: mirror thrust_axis in the bench file";
-  if (!pulls)
-    return "thrust is negative, its torque is right: the propeller pushes; turn it over, or change spin in the bench "
-           "file";
-  return "the torque says that the rotor turns the other way than spin in the bench file: change spin, or swap two "
-         "phases "
-         "of the motor";
-}
 
 SpinResult spin_by_hand(const Spin& spin) {
   const MountConfirmation clear = ask_at_the_stand(

@@ -40,9 +40,4 @@ struct SpinResult {
 /// Throws as record_run.
 [[nodiscard]] SpinResult spin_by_hand(const Spin& spin);
 
-/// What thrust and torque of a turning propeller say against the bench file: a mirrored axis, a propeller that pushes,
-/// a rotor that turns the other way. Thrust N along the thrust axis, torque N m about it, `spin` +1 counter-clockwise
-/// from above. The cell feels the reaction: it opposes the turning.
-[[nodiscard]] std::optional<std::string> doubt_about_signs(double thrust_n, double torque_nm, int spin);
-
 }  // namespace kphi::daq

@@ -62,6 +62,7 @@ sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::B
   settings.seed = config.simulation->seed;
   settings.plant.air_density_kg_m3 = config.simulation->air_density_kg_m3;
   take_stand(config.simulation->stand, repetition, settings.plant);
+  settings.plant.stand.spin = config.iq.spin;
   const std::string &faults = config.simulation->faults, &motor = config.simulation->motor;
   if (!faults.empty()) sim::load_faults(profiles::read_text(faults), faults, settings);
   if (!motor.empty()) {

@@ -12,6 +12,7 @@ class FaultyCampaign : public CampaignOnBench {
     const auto script = folder_.path() / "faults.yaml";
     std::ofstream(script) << "format: kphi-faults/1\nfaults:\n" << faults;
     config_ = test::deterministic_config(seed, script.string());
+    if (otherwise_) otherwise_(config_);
     return CampaignOnBench::run();
   }
   /// Why the turning motor was stopped.
@@ -45,6 +46,7 @@ class FaultyCampaign : public CampaignOnBench {
   }
 
   const std::vector<std::string> kNoFlags{"", "", "", ""};
+  std::function<void(profiles::BenchConfig&)> otherwise_;  ///< what the bench file says
 };
 
 }  // namespace kphi::daq

@@ -175,23 +175,35 @@ TEST_F(FaultyCampaign, GoesOnBeyondARangeFlaggedWithOneWarning) {
 }
 
 TEST_F(FaultyCampaign, FlagsAllStepsOfARunInWhichTheBoxWasGivenOtherUnits) {
-  EXPECT_EQ(run("  - {at_s: 1.5, kind: units, force_unit: 4}\n").runs, 2);  // kN
+  EXPECT_EQ(run("  - {at_s: 4, kind: units, force_unit: 6}\n").runs, 2);  // gf, while the rotor coasts
   EXPECT_THAT(flags(0), Each(HasSubstr("configuration_changed")));
   EXPECT_EQ(flags(1), kNoFlags) << "read with its own scale";
   EXPECT_THAT(events(0), ElementsAre(EventKind::configuration_changed));
   EXPECT_EQ(said_.count("configuration changed since the run began: units, counts per unit; all steps"), 1);
   EXPECT_EQ(said_.count("configuration changed since it was last read: units, counts per unit; recording this run"), 1);
-  const auto last = reduce(recording(0))[3];
-  EXPECT_LT(last.thrust_n, 0.5 * test::kTrueK5x3 * last.speed_rad_s * last.speed_rad_s) << "a wrong number";
   expect_whole();
 }
 
-TEST_F(FaultyCampaign, RefusesTheNextRunOfABoxThatNoLongerSuitsTheCampaign) {
-  EXPECT_THAT([&] { (void)run("  - {at_s: 1.5, kind: units, force_unit: 5}\n"); },  // whole kilograms of force
-              ThrowsMessage<ConfigurationError>(HasSubstr("one count is 9.81 N")))
-      << "a thrust of 0 N without a flag";
-  EXPECT_THAT(flags(0), Each(HasSubstr("configuration_changed")));
-  EXPECT_EQ(results_->complete_runs().size(), 1u);
+TEST_F(FaultyCampaign, StopsInUnitsInWhichTheCellShowsNothing) {
+  EXPECT_THAT(stop("  - {at_s: 1.5, kind: units, force_unit: 5}\n"),  // whole kilograms of force
+              HasSubstr("repeats one value"));
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("configuration changed")));
+}
+
+TEST_F(FaultyCampaign, StopsWhenThrustIsMirroredOrMissing) {
+  otherwise_ = [](profiles::BenchConfig& config) { config.thrust_sign = -1; };
+  EXPECT_THAT(stop("  []\n"), AllOf(HasSubstr("N at 6000 RPM"), HasSubstr("mirror thrust_axis in the bench file")));
+  otherwise_ = [](profiles::BenchConfig& config) { config.thrust_axis = 0; };
+  campaign_.limits["thrust_max_n"] = 10;
+  EXPECT_THAT(stop("  []\n"), HasSubstr("does the load cell carry the motor?"));
+}
+
+TEST_F(FaultyCampaign, RefusesAFrozenZeroBeforeAnythingTurns) {
+  EXPECT_THAT(stop("  - {at_s: 0, kind: frozen, axes: 63}\n"),
+              AllOf(HasSubstr("take the zero"), HasSubstr("Fz repeated one value in all"), HasSubstr("it is frozen")));
+  for (const auto& reading : aborted().motor) {
+    EXPECT_TRUE(reading.channel != MotorChannel::speed || std::abs(reading.value) < 1.0) << reading.value;
+  }
 }
 
 TEST_F(FaultyCampaign, SaysThatItDoesNotKnowWhenTheBoxCannotBeReadAgain) {

@@ -84,13 +84,15 @@ TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {
   EXPECT_THAT(ran(bench.run_command(), 3).err, AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));
 }
 
-TEST(FaultInjector, OtherUnitsDuringARunAreNoticedAtItsEnd) {
+TEST(FaultInjector, OtherUnitsDuringARunStopItAndAreNamed) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 20, kind: units, force_unit: 4}\n"});
   write(bench.path("short.yaml"), short_campaign_text("0", 1, 60));  // one run of 36 s and more
-  const Ended run = ran(bench.run_command());
+  const Ended run = ran(bench.run_command(), 4);
   EXPECT_THAT(run.err, AllOf(HasSubstr("configuration changed since the run began: units, counts per unit"),
-                             HasSubstr("60 of 60 steps flagged")));
-  EXPECT_EQ(bytes_of(run.folder() + "/faults.yaml"), bytes_of(bench.path("faults.yaml")));
+                             HasSubstr("SAFETY STOP: thrust ")));
+  const auto folder = campaign_below(bench.path("results"), "faults.yaml");
+  ASSERT_TRUE(folder);
+  EXPECT_EQ(bytes_of(folder->path() / "faults.yaml"), bytes_of(bench.path("faults.yaml")));
 }
 
 TEST(BadScript, OrATruthLogThatCannotBeWrittenIsNamedBeforeTheSimulatorStarts) {

@@ -156,7 +156,7 @@ TEST_F(FitProgram, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
   expect_refused({"export", config, "--to", "ardupilot"}, 2, "agilicious");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
-  expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "nan"}, 2, "0 to 270");
+  expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "nan"}, 2, "nan is not a finite number");
   expect_refused({"import", file("unit.csv", "Thrust (stone),Motor Electrical Speed (RPM)\n1,2\n"), "--out",
                   (folder_ / "tables").string()},
                  2, "stone");

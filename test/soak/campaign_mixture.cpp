@@ -29,6 +29,7 @@ constexpr std::array kCellFaults{
     "kind: restart",
     "kind: reboot, down_s: <0~1.5>, resume: <0..1>",
     "for_s: <0.01~0.6>, kind: stall",
+    "for_s: <0.07~0.6>, kind: frozen, axes: <1..63>",
     "kind: ft_jump_back, samples: <1000..5000>",
     "for_s: <0.05~1>, kind: short_block, p: <0.01~0.3>, records: 1",
     "for_s: <0.1~1>, kind: address, address: 10.0.0.9",

@@ -65,6 +65,7 @@ class NetBoxDevice {
   void set_status(std::uint32_t bits) noexcept { forced_status_ |= bits; }
   void clear_status(std::uint32_t bits) noexcept { forced_status_ &= ~bits; }
   void force_saturation(unsigned axes) noexcept { signal_.force_saturation(axes); }
+  void freeze(unsigned axes) noexcept { signal_.freeze(axes); }
   /// As written through the web pages: quantised and clamped silently.
   void configure(const NetBoxSettings& settings);
 

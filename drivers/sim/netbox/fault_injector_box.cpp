@@ -92,6 +92,7 @@ void FaultInjector::begin(std::size_t index) {
   if (fault.is(K::zero_drift)) drifting_.push_back(index);
   if (fault.is(K::status)) box_.set_status(static_cast<std::uint32_t>(fault.bits));
   if (fault.is(K::saturation)) box_.force_saturation(fault.axes);
+  if (fault.is(K::frozen)) box_.freeze(fault.axes);
   if (fault.is(K::address)) move_to(fault.ip);
   NetBoxSettings settings = box_.settings();
   if (fault.is(K::rate)) settings.rate_hz = fault.rate_hz;
@@ -111,6 +112,7 @@ void FaultInjector::end(const Fault& fault) {
   if (fault.is(K::clock_skew)) skew_ = nullptr;
   if (fault.is(K::status) && !fault.latched) box_.clear_status(static_cast<std::uint32_t>(fault.bits));
   if (fault.is(K::saturation)) box_.force_saturation(0);
+  if (fault.is(K::frozen)) box_.freeze(0);
 }
 
 void FaultInjector::sample_disturbed(LoadCellSample sample) {

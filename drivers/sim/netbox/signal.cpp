@@ -60,6 +60,7 @@ void NetBoxSignal::measure(const Wrench& wrench) noexcept {
     if (filter_ != 0) value = filters_[axis].step(value);
     const double counts = value * scale_[axis];
     const std::int64_t whole = static_cast<std::int64_t>(counts + (counts < 0 ? -0.5 : 0.5)) - software_bias_[axis];
+    if ((frozen_axes_ >> axis & 1u) != 0) continue;
     counts_[axis] = static_cast<std::int32_t>(std::clamp<std::int64_t>(whole, INT32_MIN, INT32_MAX));
   }
   if (saturation_left_ > 0) --saturation_left_;

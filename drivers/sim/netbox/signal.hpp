@@ -39,6 +39,9 @@ class NetBoxSignal {
   /// These axes (bits 0..5) read their full range and are flagged, whatever the load.
   void force_saturation(unsigned axes) noexcept { forced_axes_ = axes; }
 
+  /// These axes (bits 0..5) repeat their present counts.
+  void freeze(unsigned axes) noexcept { frozen_axes_ = axes; }
+
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
   [[nodiscard]] bool saturated() const noexcept { return saturation_left_ > 0; }
   /// Counts per SI unit and axis; 0 without a calibration.
@@ -53,7 +56,7 @@ class NetBoxSignal {
   std::array<LowPass, 6> filters_{};
   std::array<std::int64_t, 6> software_bias_{};  // counts
   Counts counts_{};
-  unsigned forced_axes_ = 0;
+  unsigned forced_axes_ = 0, frozen_axes_ = 0;
   int saturation_left_ = 0;  // samples for which the bit stays set
 };
 

@@ -106,8 +106,8 @@ void Plant::mount(const PropellerTruth* propeller, double named_deg) {
   if (propeller != nullptr) {
     const double occlusion_deg = stand_.true_deg(named_deg);
     const double mounted = 1 + stand_.mounting * mountings_.normal();
-    air_.thrust = density_share_ * stand_.k(*propeller, occlusion_deg) * mounted;
-    air_.thrust_unoccluded = density_share_ * stand_.k(*propeller, 0);
+    air_.thrust = stand_.spin * density_share_ * stand_.k(*propeller, occlusion_deg) * mounted;
+    air_.thrust_unoccluded = stand_.spin * density_share_ * stand_.k(*propeller, 0);
     air_.rise_per_krad_s = stand_.rise_per_krad_s;
     air_.blades = propeller->blades;
     air_.occluded_share = occlusion_deg / 360;

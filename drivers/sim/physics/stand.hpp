@@ -28,6 +28,7 @@ struct StandParameters {
   double mounting = 0;                           ///< standard deviation of k from mounting to mounting, share
   std::optional<std::uint64_t> mounting_seed{};  ///< nullopt: by that of the plant
   std::vector<Plate> plates;
+  int spin = +1;  ///< sense in which the propellers pull, +1 counter-clockwise
 
   /// At 1000 rad/s and 1.225 kg/m³, N/(rad/s)², before the scatter of the mountings. Degrees, [0, 360).
   [[nodiscard]] double k(const PropellerTruth& propeller, double true_deg) const;

@@ -158,6 +158,7 @@ const std::vector<FaultRow>& fault_rows() {
         key<&F::period>("period_s", 1, 1e6)}},
       {K::status, "status", kOpen, {required<&F::bits>("bits", 1, kMany), key<&F::latched>("latched")}},
       {K::saturation, "saturation", kOpen, {required<&F::axes>("axes", 1, 63)}},
+      {K::frozen, "frozen", kOpen, {required<&F::axes>("axes", 1, 63)}},
       {K::units,
        "units",
        kOnce,

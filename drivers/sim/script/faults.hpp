@@ -43,6 +43,7 @@ enum class FaultKind : std::uint8_t {
   clock_skew,    ///< `ppm` and ±`wander_ppm` sinusoidal of period `period_s`
   status,        ///< `bits` set; `latched`: until a power cycle
   saturation,    ///< axes of mask `axes` read their full range
+  frozen,        ///< axes of mask `axes` repeat their counts; sequences and status stay healthy
   units,         ///< force_unit and torque_unit by code
   rate,          ///< comrdtrate becomes `rate_hz`; what that does to the stream: NetBoxQuirks::rate_write
   zero_drift,    ///< the zero of `axis` moves by `amount` (N, N m) with the time constant `tau_s`

@@ -161,7 +161,7 @@ TEST_F(DryRunOfAShortCampaign, SaysThatNobodyKnowsHowLongCoolingTakes) {
 }
 
 TEST(ThrustPrior, OfFiveInchesIsWhatOthersMeasuredAndOfSixTwiceThatAndSaysSo) {
-  const auto five = thrust_prior({"5x3", "", 5, 3}), six = thrust_prior({"6x2", "", 6, 2});
+  const auto five = profiles::thrust_prior({"5x3", "", 5, 3}), six = profiles::thrust_prior({"6x2", "", 6, 2});
   ASSERT_TRUE(five && six);
   EXPECT_EQ(five->low.value(), 1.12e-6);
   EXPECT_EQ(five->high.value(), 1.38e-6);
@@ -171,9 +171,9 @@ TEST(ThrustPrior, OfFiveInchesIsWhatOthersMeasuredAndOfSixTwiceThatAndSaysSo) {
 }
 
 TEST(ThrustPrior, IsUnknownOfWhatNobodyMeasured) {
-  EXPECT_FALSE(thrust_prior({"5x6", "", 5, 6}));
-  EXPECT_FALSE(thrust_prior({"2x2", "", 2, 2}));
-  EXPECT_FALSE(thrust_prior({"10x2", "", 10, 2}));
+  EXPECT_FALSE(profiles::thrust_prior({"5x6", "", 5, 6}));
+  EXPECT_FALSE(profiles::thrust_prior({"2x2", "", 2, 2}));
+  EXPECT_FALSE(profiles::thrust_prior({"10x2", "", 10, 2}));
 }
 
 }  // namespace dry_run_test

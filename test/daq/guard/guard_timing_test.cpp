@@ -67,6 +67,8 @@ Instant last_reading(const results::RunRecording& run, std::optional<MotorChanne
   return last;
 }
 
+constexpr Duration kFrozen = milliseconds(50) + kPrompt;
+
 /// What a test does to the bench when its time has come.
 using Act = void (*)(CoastingBench&, Instant now);
 
@@ -263,6 +265,11 @@ const Case kCases[] = {
      nullptr, at(milliseconds(2200)), "load cell: the Net Box reports .analog board error."},
     {"AxiaError", Watched::state, "  - {at_s: 2.2, kind: status, bits: 0x80000004}\nquirks: {axia: true}\n", nullptr,
      at(milliseconds(2200)), "load cell: the Axia reports .broken gage. .status 0x80000004. for 5.9 ms"},
+    {"Frozen", Watched::frozen, lasting("frozen, axes: 63"), nullptr, at(milliseconds(2200)),
+     "load cell: .. repeats one value, 350 samples so far, which its noise in the zero cannot do",
+     EventKind::guard_trip, nullptr, false, kFrozen},
+    {"FrozenThrustAxis", Watched::frozen, lasting("frozen, axes: 4"), nullptr, at(milliseconds(2200)),
+     "load cell: Fz repeats one value", EventKind::guard_trip, nullptr, false, kFrozen},
     {"Sleep", Watched::sleep, "", nullptr, as_acted(milliseconds(300)), "this computer slept for 0.3 s",
      EventKind::guard_trip, [](CoastingBench& bench, Instant) { bench.bench.sleep(milliseconds(300)); }},
     {"Derates", Watched::state, lasting("motor_redline, speed_rad_s: 800"), nullptr,

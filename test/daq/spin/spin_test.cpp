@@ -173,15 +173,5 @@ TEST_F(ByHand, TurnsNothingWithoutSomebodyWhoSaysThatTheStandIsClear) {
   EXPECT_FALSE(std::filesystem::exists(folder_.path() / "spin.h5"));
 }
 
-TEST(DoubtAboutSigns, TellsMirroredAxisPushingPropellerAndWrongSenseApart) {
-  EXPECT_EQ(doubt_about_signs(6, -0.08, +1), std::nullopt);
-  EXPECT_EQ(doubt_about_signs(6, +0.08, -1), std::nullopt);
-  EXPECT_EQ(doubt_about_signs(0.01, 0.08, +1), std::nullopt) << "too little to say";
-  EXPECT_EQ(doubt_about_signs(std::nan(""), std::nan(""), +1), std::nullopt);
-  EXPECT_THAT(*doubt_about_signs(-6, +0.08, +1), HasSubstr("mirror thrust_axis"));
-  EXPECT_THAT(*doubt_about_signs(-6, -0.08, +1), HasSubstr("the propeller pushes"));
-  EXPECT_THAT(*doubt_about_signs(6, +0.08, +1), HasSubstr("turns the other way"));
-}
-
 }  // namespace spin_test
 }  // namespace kphi::daq

@@ -69,6 +69,7 @@ TEST(FaultFile, ReadsEveryKind) {
   - {at_s: 0, for_s: 1, kind: jitter, mean_s: 0.0001, p: 0.01, spike_s: 0.005}
   - {at_s: 0, for_s: 1, kind: short_block, p: 0.5, records: 3}
   - {at_s: 0, kind: overrun, samples: 3}
+  - {at_s: 0, kind: frozen, axes: 63}
   - {at_s: 0, kind: rate, rate_hz: 1000}
   - {at_s: 0, kind: zero_drift, axis: 2, amount: 0.5, tau_s: 30}
   - {at_s: 3, for_s: 9, kind: address, address: 127.0.0.2}
