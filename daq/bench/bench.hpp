@@ -175,6 +175,8 @@ class Bench {
   /// Why nothing would switch the devices off if this program were killed: then nothing may turn, and nobody may come
   /// near. Empty: something would. Thread-safe.
   [[nodiscard]] virtual std::string unprotected() const { return {}; }
+  /// By how much this computer hands on too late what its serial ports hear, wall time. Thread-safe.
+  [[nodiscard]] virtual Duration serial_late() const noexcept { return Duration(0); }
   /// Events of the bench itself since the last call. The guard's thread.
   [[nodiscard]] virtual std::vector<StreamEvent> take_news() { return {}; }
   /// Writes the run files.

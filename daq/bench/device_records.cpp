@@ -42,7 +42,7 @@ std::vector<StreamEvent> to_events(const std::vector<netbox::Event>& events) {
   std::vector<StreamEvent> out;
   for (const netbox::Event& event : events) {
     std::string text = netbox::to_string(event);
-    if (event.kind == EventKind::rebooted) text += "; the steps that follow in this run are flagged";
+    if (event.kind == EventKind::rebooted) text += "; steps of this run without a zero taken since are flagged";
     out.push_back({event.kind, event.at.count(), event.records, std::move(text)});
   }
   return out;

@@ -253,10 +253,13 @@ std::size_t Guard::take(std::span<LoadCellRecord> out) {
 /// Of the guard's own thread, or of one that talks to a device.
 void Guard::notice_absence(Instant now) noexcept {
   const double absent = std::max(wall_seconds_since(polled_ns_, now), to_seconds(real_time::overdue()));
-  if (absent < kAbsence) return;
+  const double serial_late = to_seconds(bench_.serial_late());
+  if (std::max(absent, serial_late) < kAbsence) return;
+  Absence found{now, std::max(absent, serial_late), serial_late > absent};
   const Absence past = absence_.read();
-  const bool counts = wall_seconds_since(past.ended.count(), now) <= kAbsenceCounts;
-  absence_.publish({now, std::max(absent, counts ? past.lasted_s : 0.0)});
+  if (wall_seconds_since(past.ended.count(), now) <= kAbsenceCounts && past.lasted_s > found.lasted_s)
+    found = {now, past.lasted_s, past.of_serial};
+  absence_.publish(found);
 }
 
 /// While this computer is busy with other things, and right after it, a device seems late and a rotor seems to stray
@@ -270,7 +273,10 @@ void Guard::name_absence(Trip& trip) const {
   const Absence absence = absence_.read();
   if (absence.lasted_s < kAbsence) return;
   if (wall_seconds_since(absence.ended.count(), trip.noticed) > kAbsenceCounts) return;
-  trip.reason = fmt::format("{} for {:.2g} s; then: {}", kDidNotRun, absence.lasted_s, trip.reason);
+  trip.reason = absence.of_serial != 0
+                    ? fmt::format("this computer handed on {:.2g} s late what its serial ports heard; then: {}",
+                                  absence.lasted_s, trip.reason)
+                    : fmt::format("{} for {:.2g} s; then: {}", kDidNotRun, absence.lasted_s, trip.reason);
   trip.source = Source::computer;
 }
 

@@ -86,10 +86,11 @@ class Guard final {
   [[nodiscard]] const GuardLimit* limit_of(Watched watched) const noexcept {
     return limits_[static_cast<std::size_t>(watched)];
   }
-  /// The computer did not run the guard's thread.
+  /// The computer did not run the guard's thread, or one that serves it.
   struct Absence {
     Instant ended{0};
     double lasted_s = 0;
+    std::uint64_t of_serial = 0;  ///< 1: it ran the guard, but not what hands on the bytes of serial ports
   };
   void trip(Trip trip) noexcept;
   void hold(Watched watched, double value);

@@ -12,6 +12,7 @@
 #include "daq/bench/device_records.hpp"
 #include "daq/guard/interlock.hpp"
 #include "daq/hardware/live_supply.hpp"
+#include "daq/hardware/terminal_watch.hpp"
 #include "daq/sentinel/sentinel.hpp"
 #include "drivers/iq/link/motor.hpp"
 #include "drivers/netbox/configuration/settings.hpp"
@@ -95,6 +96,7 @@ class LiveBench final : public Bench {
   [[nodiscard]] results::FileLayer& files() override { return results::disk(); }
   [[nodiscard]] Duration sync_interval() const override;
   [[nodiscard]] std::string unprotected() const override { return sentinel_.failure(); }
+  [[nodiscard]] Duration serial_late() const noexcept override { return terminals_.late(); }
   [[nodiscard]] std::vector<StreamEvent> take_news() override;
   void mounted(const std::string& propeller_id, double occlusion_deg) override;
   void hung(int axis, double newtons) override;
@@ -111,6 +113,7 @@ class LiveBench final : public Bench {
 
   profiles::BenchConfig config_;
   SteadyClock clock_;
+  TerminalWatch terminals_;
   AirSource air_;
   std::unique_ptr<LoadCellLink> load_cell_;
   std::unique_ptr<LiveSupply> supply_;

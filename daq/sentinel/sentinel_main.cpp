@@ -314,11 +314,12 @@ int main(int count, char** arguments) {
   alarm(kTooLong_s);
   const int words = (count - 1) / kFieldsOfAWord < kMostWords ? (count - 1) / kFieldsOfAWord : kMostWords;
   bool free[kMostWords];
-  for (int i = 0; i < words; ++i) free[i] = takes(arguments[kFieldsOfAWord * (i + 1)]);
+  char** fields = arguments + 1;
+  for (int i = 0; i < words; ++i, fields += kFieldsOfAWord) free[i] = takes(fields[kFieldsOfAWord - 1]);
   int failed = 0;
-  for (int i = 0; i < words; ++i) {
+  fields = arguments + 1;
+  for (int i = 0; i < words; ++i, fields += kFieldsOfAWord) {
     if (!free[i]) continue;
-    char** const fields = arguments + 1 + kFieldsOfAWord * i;
     const Word word(fields);
     const Outcome outcome = say(word, fields[5]);
     failed += outcome < Outcome::told;

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kBinNs = 0.5e9;
 constexpr std::size_t kLeastBins = 4;
+constexpr double kMostDelayNs = 1e9, kMostSkew = 0.01;  // the clock of a box is a crystal
 
 /// The least delayed record of each half second of device time, and the line through them.
 class DelayFloor {
@@ -22,7 +23,8 @@ class DelayFloor {
     }
   }
 
-  void fit(ClockEpoch& epoch) const {
+  void fit(ClockEpoch& epoch) {
+    leave_out_what_stepped();
     double mean_x = 0, mean_y = 0, xx = 0, xy = 0;
     for (const Point& p : bins_) {
       mean_x += p.device_ns / static_cast<double>(bins_.size());
@@ -44,6 +46,17 @@ class DelayFloor {
   struct Point {
     double device_ns, delay_ns;
   };
+
+  /// The stamps of a computer whose calendar stepped can be wrong by years: they must not tilt the line.
+  void leave_out_what_stepped() {
+    std::vector<Point> sorted = bins_;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle, {}, &Point::delay_ns);
+    const double usual_ns = middle->delay_ns;
+    std::erase_if(bins_, [&](const Point& p) {
+      return std::abs(p.delay_ns - usual_ns) > kMostDelayNs + kMostSkew * std::abs(p.device_ns - middle->device_ns);
+    });
+  }
   std::vector<Point> bins_;
   double bin_end_ = -1;
 };

@@ -307,11 +307,23 @@ std::vector<Transition> transitions_of(const RunRecording& run) {
   return Reduction(run, {run.load_cell, run.header}).transitions();
 }
 
+namespace {
+
+/// What lies beyond the run's phases is a stamp that cannot be.
+Window within_run(const RunRecording& run, Window window) {
+  constexpr Nanoseconds kAround = 5'000'000'000;
+  if (run.phases.empty()) return window;
+  return {std::max(window.begin, run.phases.front().time_ns - kAround),
+          std::min(window.end, run.phases.back().time_ns + kAround)};
+}
+
+}  // namespace
+
 RunViews views_of(const RunRecording& run, const LoadCellColumns& cell) {
   RunViews views{sample_times(run, cell), {}};
   if (views.sample_times.empty()) return views;
   try {
-    views.plot = Reduction(run, cell).plot({views.sample_times.front(), views.sample_times.back()});
+    views.plot = Reduction(run, cell).plot(within_run(run, {views.sample_times.front(), views.sample_times.back()}));
   } catch (const RecordError&) {
     // The scale is invalid: kphi verify says so.
   }

@@ -256,6 +256,8 @@ struct Trial {
   int sequences;
 };
 
+std::ostream& operator<<(std::ostream& out, const Trial& trial) { return out << trial.verb << trial.seed; }
+
 class Hands : public testing::TestWithParam<Trial> {};
 
 /// On a busy computer, and to the module.

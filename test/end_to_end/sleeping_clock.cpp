@@ -3,7 +3,8 @@
 // that ran out in the kernel meanwhile waits for what is left of it.
 //
 // The file that KPHI_SLEPT names is 8 bytes: the nanoseconds slept so far. Whoever stops the program writes them before
-// it goes on, see sleeping_host.hpp. Without the variable nothing has slept.
+// it goes on, see sleeping_host.hpp. Without the variable nothing has slept. KPHI_STEPPED likewise: by how much the
+// calendar clock has stepped; the kernel's receive stamps have not.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -26,15 +27,21 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 using Nanoseconds = std::atomic<std::int64_t>;
 static_assert(Nanoseconds::is_always_lock_free && sizeof(Nanoseconds) == 8);
 const Nanoseconds* slept_so_far = nullptr;
+const Nanoseconds* stepped = nullptr;
 
-[[gnu::constructor]] void open_slept_time() {
-  const char* name = std::getenv("KPHI_SLEPT");
-  if (name == nullptr) return;
+const Nanoseconds* opened(const char* variable) {
+  const char* name = std::getenv(variable);
+  if (name == nullptr) return nullptr;
   const int file = open(name, O_RDONLY | O_CLOEXEC);
   void* page = file < 0 ? MAP_FAILED : mmap(nullptr, sizeof(Nanoseconds), PROT_READ, MAP_SHARED, file, 0);
   if (page == MAP_FAILED) std::abort();
   close(file);
-  slept_so_far = static_cast<const Nanoseconds*>(page);
+  return static_cast<const Nanoseconds*>(page);
+}
+
+[[gnu::constructor]] void open_times() {
+  slept_so_far = opened("KPHI_SLEPT");
+  stepped = opened("KPHI_STEPPED");
 }
 
 std::int64_t slept() { return slept_so_far == nullptr ? 0 : slept_so_far->load(); }
@@ -50,6 +57,7 @@ timespec to_timespec(std::int64_t ns) { return {ns / kSecond, ns % kSecond}; }
 int read_clock(clockid_t clock, timespec* time) {
   const auto result = static_cast<int>(syscall(SYS_clock_gettime, clock, time));
   if (result == 0 && stands_still(clock)) *time = to_timespec(to_ns(*time) - slept());
+  if (result == 0 && clock == CLOCK_REALTIME && stepped != nullptr) *time = to_timespec(to_ns(*time) + stepped->load());
   return result;
 }
 

@@ -156,20 +156,27 @@ void LoadCell::wait_for_datagrams() noexcept {
 void LoadCell::drain() noexcept {
   drained_ = 0;
   for (int batch = 0; batch < kBatchesPerDrain; ++batch) {
+    const Instant asked = clock_.now();
     const std::span<const UdpSocket::Datagram> datagrams = socket_.receive();
-    if (datagrams.empty()) break;
-    // The clock is read once for all.
-    const timespec& first = datagrams.front().stamp;
-    const bool stamped = first.tv_sec != 0;
-    const Instant at_first = stamped ? clock_.at_realtime(first) : clock_.now();
-    for (const UdpSocket::Datagram& datagram : datagrams) {
-      connection_.note_host_drops(datagram.dropped);
-      connection_.receive(
-          datagram.bytes,
-          stamped ? at_first + clock_.stretched(to_duration(datagram.stamp) - to_duration(first)) : at_first);
+    if (!datagrams.empty()) {
+      // The clock is read once for all. A stamp is calendar time, which may step by years: no datagram came after it
+      // was taken, nor before the socket was last seen empty.
+      const Instant taken = clock_.now();
+      const timespec& first = datagrams.front().stamp;
+      const bool stamped = first.tv_sec != 0;
+      const Instant at_first = stamped ? clock_.at_realtime(first) : taken;
+      for (const UdpSocket::Datagram& datagram : datagrams) {
+        connection_.note_host_drops(datagram.dropped);
+        const Instant arrival =
+            stamped ? at_first + clock_.stretched(to_duration(datagram.stamp) - to_duration(first)) : at_first;
+        connection_.receive(datagram.bytes, std::clamp(arrival, std::min(emptied_, taken), taken));
+      }
+      drained_ += datagrams.size();
     }
-    drained_ += datagrams.size();
-    if (datagrams.size() < UdpSocket::kBatch) break;
+    if (datagrams.size() < UdpSocket::kBatch) {
+      emptied_ = asked;
+      break;
+    }
   }
 }
 

@@ -80,6 +80,7 @@ class LoadCell {
   std::atomic<bool> stopping_{false}, bias_requested_{false};
   std::atomic<std::uint32_t> consumer_waits_{0};  // a futex: poll(2) costs both threads more
   std::size_t drained_ = 0;                       // datagrams, last time
+  Instant emptied_{0};                            // none that waits in the socket arrived before
   Instant health_due_{0};
 
   // Published by the receive thread.
