@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "results/checksums.hpp"
 #include "results/digest.hpp"
 #include "results/run_reader.hpp"
@@ -109,16 +110,26 @@ std::map<std::string, std::string> digests_of_copies(const CampaignFolder& folde
 
 /// Adds a problem unless the file is the one of the journal.
 void check_file(const std::filesystem::path& path, const std::string& sha256, std::vector<std::string>& problems) {
-  const bool exists = std::filesystem::exists(path);
-  if (!exists) problems.push_back(path.string() + ": missing, but in the journal");
-  if (exists && sha256_of_file(path) != sha256)
+  const auto there = std::filesystem::symlink_status(path);
+  if (!std::filesystem::exists(there)) {
+    problems.push_back(path.string() + ": missing, but in the journal");
+  } else if (!std::filesystem::is_regular_file(there)) {
+    problems.push_back(path.string() + ": a link, a folder, a pipe or a device, not a file");
+  } else if (sha256_of_file(path) != sha256) {
     problems.push_back(path.string() + ": SHA-256 does not match the journal");
+  }
 }
 
 /// Adds a problem unless the folder holds them as given.
 void check_files(const CampaignFolder& folder, const std::map<std::string, std::string>& digests,
                  std::vector<std::string>& problems) {
-  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, problems);
+  for (const auto& [file, digest] : digests) {
+    if (lies_inside(file))
+      check_file(folder.path() / file, digest, problems);
+    else
+      problems.push_back(
+          fmt::format("{}: the journal names a file outside the folder: {}", folder.path().string(), printable(file)));
+  }
 }
 
 DataRejected changed_run(const std::string& problem) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "base/error.hpp"
@@ -15,6 +16,10 @@ constexpr std::string_view kSeal = "# sha256: ";
 constexpr std::size_t kDigits = 64;
 
 }  // namespace
+
+bool lies_inside(const std::filesystem::path& name) {
+  return !name.empty() && name.is_relative() && std::find(name.begin(), name.end(), "..") == name.end();
+}
 
 std::string sealed(std::string text) {
   const std::string digest = sha256(text);
@@ -65,7 +70,9 @@ std::vector<std::string> unlike_sums(const std::filesystem::path& folder) {
   std::vector<std::string> problems;
   for (const auto& [file, digest] : read_sums(folder)) {
     const std::filesystem::path path = folder / file;
-    if (!std::filesystem::is_regular_file(path)) {
+    if (!lies_inside(file)) {
+      problems.push_back(fmt::format("{}: {} names a file outside the folder", path.string(), kSumsFile));
+    } else if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(path))) {
       problems.push_back(fmt::format("{}: missing, but in {}", path.string(), kSumsFile));
     } else if (sha256_of_file(path) != digest) {
       problems.push_back(

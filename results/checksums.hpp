@@ -11,6 +11,9 @@
 
 namespace kphi::results {
 
+/// The name of a file within a folder, by the name alone: relative, and nowhere "..".
+[[nodiscard]] bool lies_inside(const std::filesystem::path& name);
+
 /// `text` with its last line: "# sha256: …" over all that stands above it.
 [[nodiscard]] std::string sealed(std::string text);
 /// Throws DataRejected if the last line is such a seal and does not match; a text without one is let pass.

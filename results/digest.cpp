@@ -1,16 +1,19 @@
 #include "results/digest.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <xxhash.h>
 
 #include <array>
 #include <cerrno>
-#include <cstdio>
 #include <new>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/ordered_work.hpp"
 #include "results/file_layer.hpp"
@@ -59,12 +62,18 @@ std::string sha256(std::string_view bytes) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& path) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-  if (!file) throw RecordError(failure_text(path.string(), errno));
+  // A pipe or a device would keep the program waiting, or never end.
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat about {};
+  if (file.number() < 0 || ::fstat(file.number(), &about) != 0) throw RecordError(failure_text(path.string(), errno));
+  if (!S_ISREG(about.st_mode)) throw RecordError(path.string() + ": is a folder, a pipe or a device, not a file");
   Sha256 digest;
   std::vector<char> block(1 << 18);
-  while (const std::size_t n = std::fread(block.data(), 1, block.size(), file.get())) digest.update({block.data(), n});
-  if (std::ferror(file.get())) throw RecordError(failure_text(path.string(), errno));
+  for (ssize_t n = 0; (n = ::read(file.number(), block.data(), block.size())) != 0;) {
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw RecordError(failure_text(path.string(), errno));
+    digest.update({block.data(), static_cast<std::size_t>(n)});
+  }
   return digest.hex();
 }
 

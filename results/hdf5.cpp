@@ -133,6 +133,27 @@ std::string described(const ColumnLayout& column) {
   return list.empty() ? column.long_name : list;
 }
 
+/// What kphi writes lies where its name says. A link may lead to another table, into another file, or to a pipe that
+/// never answers.
+void require_no_link(const Handle& parent, const char* name, const std::string& doing) {
+  H5L_info_t link{};
+  if (H5Lexists(parent.get(), name, H5P_DEFAULT) <= 0) return;
+  check(H5Lget_info(parent.get(), name, &link, H5P_DEFAULT), doing);
+  if (link.type != H5L_TYPE_HARD) throw RecordError(doing + ": a link that leads elsewhere; kphi writes none");
+}
+
+/// Before anything is allocated for its rows: what a table declares must be in this file.
+void require_within_file(const Handle& dataset, std::uint64_t rows, std::size_t row_bytes, const std::string& doing) {
+  const Handle list = own(H5Dget_create_plist(dataset.get()), doing);
+  if (H5Pget_layout(list.get()) == H5D_VIRTUAL || H5Pget_external_count(list.get()) > 0)
+    throw RecordError(doing + ": its rows lie in another file; kphi writes no such table");
+  const std::uint64_t stored = H5Dget_storage_size(dataset.get());
+  constexpr std::uint64_t kMostPacked = 10;
+  const std::uint64_t most = H5Pget_nfilters(list.get()) > 0 ? kMostPacked * stored : stored;
+  if (rows > most / row_bytes)
+    throw RecordError(fmt::format("{}: {} rows are declared, {} bytes of them are in the file", doing, rows, stored));
+}
+
 /// No chunk cache: rows go from the file to the caller's memory at once.
 hid_t without_cache() {
   static const Handle access = [] {
@@ -194,6 +215,7 @@ Handle create_group(const Handle& parent, const char* name) {
 bool has_dataset(const Handle& group, const char* name) { return H5Lexists(group.get(), name, H5P_DEFAULT) > 0; }
 
 Handle open_group(const Handle& parent, const char* name) {
+  require_no_link(parent, name, fmt::format("open group {}", name));
   return own(H5Gopen2(parent.get(), name, H5P_DEFAULT), fmt::format("open group {}", name));
 }
 
@@ -305,6 +327,7 @@ void Column::write_crc() { write_attribute(dataset_, "crc32", crc()); }
 
 ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored, const std::string& file)
     : doing_(fmt::format("{}: read {}", file, name)), type_(type_of(stored)), row_bytes_(bytes_of(stored)) {
+  require_no_link(group, name, doing_);
   dataset_ = own(H5Dopen2(group.get(), name, without_cache()), doing_);
   if (stored == Stored::text) type_ = own(H5Dget_type(dataset_.get()), doing_);  // of whatever character set
   space_ = own(H5Dget_space(dataset_.get()), doing_);
@@ -316,6 +339,7 @@ ColumnReader::ColumnReader(const Handle& group, const char* name, Stored stored,
   if (width * H5Tget_size(type_.get()) != row_bytes_)
     throw RecordError(doing_ + ": has the wrong number of values per row");
   rows_ = dims_[0];
+  require_within_file(dataset_, rows_, row_bytes_, doing_);
   if (rows_ < kManyRows) return;
   const Handle list = own(H5Dget_create_plist(dataset_.get()), doing_);
   const Handle type = own(H5Dget_type(dataset_.get()), doing_);

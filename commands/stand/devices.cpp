@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -72,7 +73,11 @@ DeviceAnswer ask_load_cell(const profiles::NetBoxConfig& config, const Clock& cl
       netbox::probe({config.host, config.rdt_port, config.http_port, config.bind}, clock, settings);
   DeviceAnswer answer{"Net Box " + config.host, probe.answers(), probe.lines(), {}};
   if (probe.configuration) answer.details["configuration"] = to_json(*probe.configuration);
-  if (probe.streamed) answer.details["stream"] = to_json(probe.counters, probe.health);
+  if (probe.streamed) {
+    answer.details["stream"] = to_json(probe.counters, probe.health);
+    answer.details["noise"] = probe.noise.standard_deviation;
+  }
+  answer.has_fault = has_fault(probe.findings);
   answer.details["findings"] = probe.findings;
   return answer;
 }
@@ -138,6 +143,7 @@ DeviceAnswer ask_motor(const profiles::MotorConfig& config, const Clock& clock, 
   if (probe.adapter) answer.details["adapter"] = to_json(*probe.adapter);
   if (probe.clock_gain) answer.details["clock_gain"] = to_json(*probe.clock_gain);
   answer.details["findings"] = probe.findings;
+  answer.has_fault = has_fault(probe.findings);
   return answer;
 }
 
@@ -185,6 +191,7 @@ DeviceAnswer ask_other(const std::string& name, Link&& connect, Describe&& descr
   } catch (const DeviceError& error) {
     answer.answers = false;
     answer.lines = {std::string("fault: ") + error.what()};
+    answer.has_fault = true;
   }
   return answer;
 }
@@ -240,7 +247,8 @@ ExitCode devices(const DevicesRequest& asked) {
   if (!bench) fmt::print(stderr, "kphi: no bench file, so only the Net Box's factory address was tried; use --bench\n");
   for (const DeviceAnswer& answer : answers)
     if (answer.wanted && !answer.answers) return ExitCode::no_device;
-  return ExitCode::ok;
+  const bool faulty = std::ranges::any_of(answers, [](const auto& one) { return one.wanted && one.has_fault; });
+  return faulty ? ExitCode::failure : ExitCode::ok;
 }
 
 }  // namespace

@@ -80,7 +80,12 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
 
 }  // namespace
 
+bool has_fault(const std::vector<Finding>& findings) {
+  return std::ranges::find(findings, Severity::fault, &Finding::severity) != findings.end();
+}
+
 void DeviceAnswer::add(const std::vector<Finding>& findings) {
+  has_fault = has_fault || daq::has_fault(findings);
   for (const Finding& finding : findings) lines.push_back(finding.line());
   details["findings"] = findings;
 }

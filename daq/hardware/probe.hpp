@@ -17,9 +17,12 @@ struct DeviceAnswer {
   nlohmann::ordered_json details{};
   bool wanted = true;  ///< named in the bench file
   std::string says{};  ///< instead of "answers"
+  bool has_fault = false;
 
   void add(const std::vector<Finding>& findings);
 };
+
+[[nodiscard]] bool has_fault(const std::vector<Finding>& findings);
 
 /// Throws ConfigurationError for an invalid URI.
 [[nodiscard]] DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock);

@@ -19,7 +19,8 @@ struct Account {
   };
   std::vector<Command> commands;
   std::vector<std::pair<double, std::string>> stages;
-  std::vector<bool> outputs;  ///< of the supply
+  std::vector<bool> outputs;       ///< of the supply
+  std::vector<double> outputs_at;  ///< when it was switched so
 
   /// The supply was switched, last of all off.
   [[nodiscard]] bool ends_without_power() const { return !outputs.empty() && !outputs.back(); }
@@ -62,7 +63,10 @@ inline Account account_of(const std::string& log) {
       const std::string mode = item["motion_command"];
       account.commands.push_back({at, mode, item[mode == "velocity" ? "target_rad_s" : "target"].get<double>()});
     }
-    if (item.contains("supply_output")) account.outputs.push_back(item["supply_output"]);
+    if (item.contains("supply_output")) {
+      account.outputs.push_back(item["supply_output"]);
+      account.outputs_at.push_back(at);
+    }
     if (item.contains("stage")) account.stages.emplace_back(at, item["stage"]);
   }
   return account;

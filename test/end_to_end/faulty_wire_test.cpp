@@ -79,6 +79,15 @@ TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
   EXPECT_THAT(devices.out + devices.err, Not(HasSubstr("\xFC")));
 }
 
+TEST(FaultInjector, ACellThatRepeatsOneValueIsNamedByDevicesAndRefusedByARun) {
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 0, kind: frozen, axes: 4}\n"});
+  const Ended devices = ran({kphi(), "devices", "--wake-ups", "0", "--bench", bench.path("bench.yaml")}, 1);
+  EXPECT_THAT(devices.out, AllOf(HasSubstr("noise 0."), HasSubstr("Fz repeats one value in all "),
+                                 Not(HasSubstr("Fx repeats one value"))));
+  EXPECT_THAT(ran(bench.run_command(), 4).err, HasSubstr("Fz repeated one value in all"));
+  EXPECT_TRUE(safely(bench.account().last_speed_at() < 0)) << "nothing has turned";
+}
+
 TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset, utf16: true}\n"});
   EXPECT_THAT(ran(bench.run_command(), 3).err, AllOf(HasSubstr("NUL byte"), HasSubstr("power-cycle the box")));

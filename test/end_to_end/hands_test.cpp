@@ -94,6 +94,32 @@ TEST_P(SecondAfterGo, BelongsToTheKeyThatStops) {
 INSTANTIATE_TEST_SUITE_P(Pressed, SecondAfterGo, testing::Values("AtOnce", "WithPower"),
                          [](const auto& when) { return std::string(when.param); });
 
+TEST(SignalAtTheStart, LetsNoPowerComeOnAndNoneStay) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  constexpr double kObeyed_ms = 400;  // an order on the wire is answered and checked before the next one
+  std::vector<double> signals_ms;
+  for (const int delay_ms : {200, 350, 500, 650, 800, 950, 1100, 1200}) {
+    Process run(bench.run_command());
+    const double due_ms = bench.time_ms() + delay_ms;
+    ASSERT_TRUE(
+        bench.await([&](const auto& now) { return 1e3 * now["bench_time_s"].template get<double>() > due_ms; }));
+    run.signal(SIGINT);
+    signals_ms.push_back(bench.time_ms());
+    EXPECT_EQ(run.wait(), 130) << delay_ms << run.err();
+  }
+  const Account account = bench.account();
+  EXPECT_TRUE(safely(!has_turned(account)));
+  for (std::size_t i = 0; i < account.outputs.size(); ++i) {
+    if (!account.outputs[i]) continue;
+    // On before its signal, or not at all; off soon after it.
+    const auto signal = std::ranges::find_if(signals_ms, [&](double at) { return at > account.outputs_at[i] - 20; });
+    ASSERT_NE(signal, signals_ms.end());
+    ASSERT_LT(i + 1, account.outputs.size());
+    EXPECT_TRUE(safely(account.outputs_at[i + 1] <= *signal + kObeyed_ms))
+        << "on at " << account.outputs_at[i] << ", signal at " << *signal << ", off at " << account.outputs_at[i + 1];
+  }
+}
+
 /// A shell that controls jobs, at a terminal.
 class Shell {
  public:

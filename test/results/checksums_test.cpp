@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <random>
 
@@ -54,6 +55,19 @@ TEST(Sums, AreThoseOfSha256sum) {
   EXPECT_EQ(read_sums(folder.path()).size(), 2u) << "the other entry stays";
   std::filesystem::remove(folder.path() / "figures/b.svg");
   EXPECT_THAT(unlike_sums(folder.path()), ElementsAre(HasSubstr("b.svg: missing, but in SHA256SUMS")));
+}
+
+TEST(Sums, AreOfFilesInTheFolderAlone) {
+  const test::TemporaryFolder folder;
+  const std::string any(64, '0');
+  ASSERT_EQ(::mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  std::filesystem::create_symlink("/etc/passwd", folder.path() / "link");
+  kphi::test::write_file(folder.path() / kSumsFile,
+                         any + "  pipe\n" + any + "  link\n" + any + "  ../../etc/passwd\n" + any + "  /dev/zero\n");
+  EXPECT_THAT(unlike_sums(folder.path()),
+              testing::UnorderedElementsAre(HasSubstr("pipe: missing"), HasSubstr("link: missing"),
+                                            HasSubstr("SHA256SUMS names a file outside the folder"),
+                                            HasSubstr("SHA256SUMS names a file outside the folder")));
 }
 
 TEST(Sums, OfAnotherFormAreRefused) {

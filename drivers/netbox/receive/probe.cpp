@@ -35,6 +35,11 @@ void judge_stream(Probe& probe, std::uint32_t status, bool known_skew) {
          fmt::format("the box's clock deviates by {:.0f} ppm: its rate is not the configured one",
                      probe.health.skew_ppm),
          "read the RDT output rate on the box's Communications page again");
+  for (std::size_t axis = 0; axis < kAxisNames.size(); ++axis)
+    if (probe.noise.records > 1 && probe.configuration->range[axis] > 0 && probe.noise.standard_deviation[axis] == 0)
+      find(Severity::fault,
+           fmt::format("{} repeats one value in all {} records: it is frozen", kAxisNames[axis], probe.noise.records),
+           "switch the load cell off and on, check its cable");
   for (const Event& event : probe.events) find(Severity::warning, to_string(event), "");
 }
 
@@ -43,11 +48,13 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   const auto end = std::chrono::steady_clock::now() + duration;
   std::vector<LoadCellRecord> batch(4096);
   std::uint32_t status = 0;
+  ZeroEstimate noise;
   for (auto now = std::chrono::steady_clock::now(); now < end; now = std::chrono::steady_clock::now()) {
     if (!cell.wait(end - now)) break;
     const std::size_t count = cell.take(batch);
     for (std::size_t i = 0; i < count; ++i) {
       if (!healthy(batch[i].status)) status |= batch[i].status;
+      noise.add(batch[i].counts, batch[i].status);
     }
   }
   cell.stop();
@@ -55,6 +62,7 @@ void look_at_stream(Probe& probe, LoadCell& cell, const Clock& clock, std::chron
   probe.counters = cell.counters();
   probe.health = cell.health();
   probe.receive_buffer = cell.receive_buffer().note();
+  probe.noise = noise.result(*probe.configuration);
   probe.events = cell.take_events();
   judge_stream(probe, status, clock.shrunk(std::chrono::seconds(1)) == std::chrono::seconds(1));
 }
@@ -91,6 +99,9 @@ std::vector<std::string> Probe::lines() const {
     text.push_back(fmt::format("clock {:+.1f} ppm, jitter p50 {:.0f} us, p99 {:.0f} us", health.skew_ppm,
                                1e6 * health.jitter_p50_s, 1e6 * health.jitter_p99_s));
     text.push_back("receive buffer " + receive_buffer);
+    const std::span deviation(noise.standard_deviation);
+    text.push_back(fmt::format("noise {:.2g} N, {:.2g} N m (standard deviation of a record, where nothing moves)",
+                               fmt::join(deviation.first(3), " "), fmt::join(deviation.last(3), " ")));
   }
   for (const Finding& finding : findings) text.push_back(finding.line());
   return text;

@@ -9,6 +9,7 @@
 #include "base/finding.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/receive/audit.hpp"
+#include "drivers/netbox/receive/load.hpp"
 #include "drivers/netbox/receive/load_cell.hpp"
 #include "drivers/netbox/stream/health.hpp"
 
@@ -27,6 +28,7 @@ struct Probe {
   Counters counters;
   StreamHealth health;
   std::string receive_buffer;
+  ZeroMeasurement noise;  ///< of the streamed records: where nothing moves, their deviation is the cell's noise
   std::vector<Event> events;
   std::vector<Finding> findings;  ///< worst first
 
