@@ -68,6 +68,8 @@ bool Terminal::is_in_foreground() const {
 bool Terminal::discard_typed(const Poll& poll) {
   await_printed(poll);
   if (::isatty(input_) != 0) {
+    // From the background this would stop the program, and empty what the shell is to read.
+    for (; !is_in_foreground(); poll()) ::poll(nullptr, 0, static_cast<int>(kPoll.count()));
     int waiting = 0;
     const bool was_typed = ::ioctl(input_, FIONREAD, &waiting) == 0 && waiting > 0;
     ::tcflush(input_, TCIFLUSH);

@@ -130,7 +130,8 @@ TEST(Program, TakesTheBoxesBiasWhenTheCampaignSaysSo) {
 TEST(Program, RefusesARateThatFoldsStepsOfTheCampaignAndNamesThem) {
   RunningBench bench({8, 100, "  []\n"});
   EXPECT_THAT(ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--campaign",
-                   bench.path("short.yaml")})
+                   bench.path("short.yaml")},
+                  1)
                   .out,
               HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
   EXPECT_THAT(ran(bench.run_command(), 2).err, HasSubstr("set the RDT output rate to 7000 Hz"));

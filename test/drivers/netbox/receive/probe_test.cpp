@@ -25,7 +25,10 @@ TEST(BoxProbe, TellsWhoAnswersAndHowWellItStreams) {
   EXPECT_TRUE(found.answers());
   EXPECT_GT(found.counters.received, 1000u);
   EXPECT_EQ(found.counters.lost_network + found.counters.lost_host, 0u);
-  for (const Finding& finding : found.findings) EXPECT_EQ(finding.severity, Severity::note) << finding.what;
+  for (const Finding& finding : found.findings) {
+    const bool frozen = finding.what.find("repeats one value") != std::string::npos;  // this box has no noise
+    EXPECT_EQ(finding.severity, frozen ? Severity::fault : Severity::note) << finding.what;
+  }
   const std::vector<std::string> lines = found.lines();
   EXPECT_THAT(lines, Contains(HasSubstr("firmware 2.2.59")));
   EXPECT_THAT(lines, Contains(HasSubstr("ranges 330 330 990 N, 30 30 30 N m")));
