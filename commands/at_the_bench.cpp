@@ -17,7 +17,6 @@ bool has_terminal() {
 }
 
 std::optional<daq::Key> KeysAtTheStand::next() {
-  if (suspends_ && daq::SignalWatch::take_suspension()) terminal_.suspend();
   if (const auto key = terminal_.next_key()) return key;
   return view_.take_key();
 }

@@ -19,9 +19,7 @@ namespace kphi::commands {
 /// Keys of the terminal and of the live page.
 class KeysAtTheStand final : public daq::Keys {
  public:
-  /// `suspends`: Ctrl-Z stops the program right here, since nothing can turn.
-  KeysAtTheStand(daq::Terminal& terminal, daq::live::LiveSession& view, bool suspends)
-      : terminal_(terminal), view_(view), suspends_(suspends) {}
+  KeysAtTheStand(daq::Terminal& terminal, daq::live::LiveSession& view) : terminal_(terminal), view_(view) {}
   void begin() override { (void)terminal_.begin_keys(); }
   [[nodiscard]] std::optional<daq::Key> next() override;
   void forget(const std::function<void()>& poll) override;
@@ -29,7 +27,6 @@ class KeysAtTheStand final : public daq::Keys {
  private:
   daq::Terminal& terminal_;
   daq::live::LiveSession& view_;
-  const bool suspends_;
 };
 
 /// A simulated bench of `kphi sim` that does not run.

@@ -170,7 +170,10 @@ ExitCode show_replay(const ReplayRequest& asked) {
   put(stderr, live_greeting(view));
   if (asked.live.port) put(stderr, "The replay starts when a browser opens this address; Ctrl-C ends it.\n");
   const SignalWatch signals;
-  const std::function<bool()> stop_asked = [] { return SignalWatch::count() > 0; };
+  const std::function<bool()> stop_asked = [] {
+    if (SignalWatch::take_suspension()) SignalWatch::suspend();  // right here: nothing turns
+    return SignalWatch::count() > 0;
+  };
   while (asked.live.port && !view.is_watched() && !stop_asked())
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ManualClock clock;

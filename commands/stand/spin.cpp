@@ -143,7 +143,7 @@ ExitCode spin(const SpinOptions& options) {
                   speeds.lasts ? "" : fmt::format("; without a key it stops after {:g} s", options.dead_man_s)));
   PrintedProgress printed(stderr, has_terminal(), &describe_by_hand);
   const auto progress = view.beside(printed, bench->clock());
-  KeysAtTheStand keys(terminal, view, false);
+  KeysAtTheStand keys(terminal, view);
   const SpinResult result = view.tell_the_end([&] {
     return spin_by_hand(
         {*bench, campaign, config, *person, *progress, stop_asked, speeds, keys, file_of(options, *bench)});

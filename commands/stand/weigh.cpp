@@ -134,14 +134,17 @@ ExitCode weigh(const WeighOptions& options) {
   subject.propeller = fmt::format("{:g} kg along {}", options.kg, "xyz"[order_of(options, config).axis]);
   subject.weighs = true;
   live::LiveSession view(options.live, subject);
-  const std::function<bool()> stop_asked = [&view] { return SignalWatch::count() > 0 || view.stop_asked(); };
+  Terminal terminal(STDIN_FILENO, stderr);
+  const StopAsked stop_asked = [&] {
+    if (SignalWatch::take_suspension()) terminal.suspend();  // right here: nothing can turn
+    return SignalWatch::count() > 0 || view.stop_asked();
+  };
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
   put(stderr, live_greeting(view));
   PrintedProgress printed(stderr, has_terminal(), &describe_weighing);
   const auto progress = view.beside(printed, bench->clock());
-  Terminal terminal(STDIN_FILENO, stderr);
-  KeysAtTheStand keys(terminal, view, true);
+  KeysAtTheStand keys(terminal, view);
   if (!options.yes) keys.begin();
   const Weigh order{*bench,
                     *progress,
