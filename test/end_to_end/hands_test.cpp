@@ -139,7 +139,9 @@ class Shell {
   void await_ready() { (void)process_.wait_for_prompt({"READY> "}); }
   /// Of the last job, which has ended.
   int exit_code() {
-    type("echo en''ded: $?");
+    type(
+        "\x15"
+        "echo en''ded: $?");  // without what was typed after its end
     const std::string line = process_.wait_for("ended: ");
     return std::stoi(line.substr(line.find("ended: ") + 7));
   }
@@ -190,6 +192,22 @@ TEST(CtrlZ, AtAQuestionOnlyStopsTheProgramAndTheQuestionIsAskedAgain) {
   shell.await_ready();
   EXPECT_EQ(shell.exit_code(), 130) << shell.words();
   EXPECT_TRUE(safely(!has_turned(bench.account())));
+}
+
+TEST(CtrlZ, StopsInPlaceWhereNothingCanTurn) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  Shell shell;
+  shell.start({kphi(), "weigh", "--bench", bench.path("bench.yaml"), "--kg", "0.5", "--out", bench.path("results")});
+  shell.wait_for("Take everything off");
+  shell.press("\x1a");
+  shell.await_ready();
+  EXPECT_THAT(shell.words(), HasSubstr("Stopped"));
+  shell.type("fg");
+  while (shell.hear(std::chrono::milliseconds(200)), shell.words().rfind("READY> ") < shell.words().rfind("fg"))
+    shell.press("x");  // from the first moment in which the terminal is the program's again
+  shell.await_ready();
+  EXPECT_EQ(shell.exit_code(), 130) << shell.words();
+  EXPECT_TRUE(safely(bench.account().ends_without_power()));
 }
 
 TEST(CtrlZ, LeavesNoMotorWhoseKeysBelongToTheShell) {
