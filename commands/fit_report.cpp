@@ -276,8 +276,8 @@ ExitCode run_fit(const FitRequest& request) {
   const Identification& identification = fitted.identification;
   if (const double K_T = identification.thrust_coefficient().value; !(K_T > 0))
     throw DataRejected(fmt::format(
-        "{}: K_T is {:.3e} N/(rad/s)^2, not positive, which is no result: mirror thrust_axis in the bench file, or "
-        "import with --reverse-thrust",
+        "{}: K_T is {:.3e} N/(rad/s)^2 and must be positive; mirror thrust_axis in the bench file, or import with "
+        "--reverse-thrust",
         request.path, K_T));
   const fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");

@@ -23,7 +23,7 @@ constexpr std::array<Measured, 3> kFiveInch{{{2, 1.02e-6, 1.16e-6}, {3, 1.12e-6,
 
 std::optional<ThrustPrior> thrust_prior(const Propeller& propeller) {
   const double ratio = propeller.diameter_in / kInch;
-  if (ratio < 0.9 || ratio > 1.3) return std::nullopt;  // beyond, D⁴ is no longer to be trusted
+  if (ratio < 0.9 || ratio > 1.3) return std::nullopt;  // the D⁴ law is not reliable further away
   for (const Measured& measured : kFiveInch) {
     if (measured.blades != propeller.blades) continue;
     const double scale = std::pow(ratio, 4);

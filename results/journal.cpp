@@ -33,7 +33,7 @@ std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, st
   try {
     const nlohmann::json object = nlohmann::json::parse(line);
     for (const char* whole : {"n", "t_ns"})  // one with an exponent fits into no integer
-      if (!object.at(whole).is_number_integer()) return fmt::format("has a {} that is no whole number", whole);
+      if (!object.at(whole).is_number_integer()) return fmt::format("has a {} that is not a whole number", whole);
     entry = {object.at("n"), object.at("t_ns"), object.at("utc"), object.at("event"), object.at("data")};
   } catch (const nlohmann::json::exception& error) {
     return error.what();

@@ -13,7 +13,7 @@ constexpr double kImpossible = 30;  // -ln of the probability of a repetition th
 constexpr double kRounding = 0.25;  // counts²: what rounding alone can add to the mean square of a difference / 2
 constexpr std::uint32_t kLeastPairs = 20;
 constexpr double kJudgedSeconds = 0.1;
-constexpr double kShareOfLeast = 0.35;  // below it there is no thrust
+constexpr double kShareOfLeast = 0.35;  // less counts as missing thrust
 constexpr double kThrustSeen = 0.05;    // N: less says nothing of a sign
 constexpr double kTorqueSeen = 0.0005;  // N m
 

@@ -54,6 +54,7 @@ Guard::Guard(Bench& bench, const profiles::BenchConfig& config, const results::L
       status_watch_(bench.load_cell().box() ? bench.load_cell().box()->kind : netbox::Product::net_box,
                     bench.load_cell().records_together(), scale.sample_rate_hz),
       device_rate_hz_(scale.device_rate_hz),
+      saturation_bits_(scale.saturation_bits),
       spin_(config.iq.spin),
       frozen_watch_(scale.sample_rate_hz),
       thrust_watch_(scale.sample_rate_hz),
@@ -145,9 +146,9 @@ void Guard::judge(const LoadCellRecord& sample) {
   judge_trust(sample);
 }
 
-/// Of a cell that says that all is well: an axis at the end of its range repeats one value, too.
+/// Except at the end of a range, where a sound cell repeats one value, too.
 void Guard::judge_trust(const LoadCellRecord& sample) {
-  if (sample.status != 0) return;
+  if ((sample.status & saturation_bits_) != 0) return;
   if (const auto axis = frozen_watch_.take(sample.counts))
     trip({fmt::format("load cell: {} repeats one value, {} samples so far, which its noise in the zero cannot do",
                       kAxisNames[*axis], *frozen_watch_.limit(*axis)),

@@ -116,6 +116,7 @@ class Guard final {
   Observer observer_;
   StatusWatch status_watch_;
   const double device_rate_hz_;
+  const std::uint32_t saturation_bits_;
   const int spin_;
   FrozenWatch frozen_watch_;
   ThrustWatch thrust_watch_;

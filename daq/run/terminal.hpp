@@ -54,7 +54,7 @@ class Terminal {
   [[nodiscard]] Answer ask(const std::string& question, const std::function<void()>& printed, const Poll& poll);
 
   /// From now on each key counts by itself, without echo, also those typed since the last answer. Ctrl-C and Ctrl-Z
-  /// stay what they are. False: this is no terminal in the foreground, and there are no keys.
+  /// stay what they are. False: not a terminal in the foreground, so no key will come.
   bool begin_keys();
   void end_keys() noexcept;
   /// Does not wait. A terminal that has hung up, or belongs to another program by now, says stop.

@@ -25,7 +25,7 @@ class Sentinel {
   /// Starts kphi-sentinel, which lies beside this program or in PATH, and waits until it says that it watches. Throws
   /// DeviceError.
   explicit Sentinel(const std::vector<LastWord>& words);
-  /// Releases it: nothing is said. Takes two seconds at most.
+  /// Releases it: nothing is said. Takes a few seconds at most.
   ~Sentinel();
   Sentinel(const Sentinel&) = delete;
   Sentinel& operator=(const Sentinel&) = delete;

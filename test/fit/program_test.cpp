@@ -155,6 +155,7 @@ TEST_F(FitProgram, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   expect_refused({"export", config, "--to", "px4"}, 2, "not fitted yet; run `kphi fit");
   ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
   expect_refused({"export", config, "--to", "ardupilot"}, 2, "agilicious");
+  expect_refused({"fit", steps("mirrored", 1, 5, 3, -1)}, 5, "positive");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "nan"}, 2, "nan is not a finite number");
   expect_refused({"import", file("unit.csv", "Thrust (stone),Motor Electrical Speed (RPM)\n1,2\n"), "--out",

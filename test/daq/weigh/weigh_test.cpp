@@ -75,7 +75,7 @@ TEST_F(Weighed, AsksForTheMassOffAndOnAndGoesOnAtTheKeyAlone) {
   };
   EXPECT_EQ(weigh_half_a_kilo().levels.size(), 7u);
   EXPECT_EQ(presses, 8);
-  EXPECT_EQ(keys_.forgotten, 7) << "what was pressed before a question is no answer";
+  EXPECT_EQ(keys_.forgotten, 7) << "keys pressed before a question do not answer it";
   EXPECT_EQ(said_.count("Take everything off; then press Enter."), 4);
   EXPECT_EQ(said_.count("Put 0.5 kg on, so that it pulls along z; then press Enter."), 3);
   EXPECT_EQ(said_.count("the supply's output is off"), 1);
