@@ -299,16 +299,6 @@ class Reduction {
   Lag lag_;
 };
 
-}  // namespace
-
-Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, {run.load_cell, run.header}).reduced(); }
-
-std::vector<Transition> transitions_of(const RunRecording& run) {
-  return Reduction(run, {run.load_cell, run.header}).transitions();
-}
-
-namespace {
-
 /// What lies beyond the run's phases is a stamp that cannot be.
 Window within_run(const RunRecording& run, Window window) {
   constexpr Nanoseconds kAround = 5'000'000'000;
@@ -318,6 +308,12 @@ Window within_run(const RunRecording& run, Window window) {
 }
 
 }  // namespace
+
+Reduced reduce_with_zeros(const RunRecording& run) { return Reduction(run, {run.load_cell, run.header}).reduced(); }
+
+std::vector<Transition> transitions_of(const RunRecording& run) {
+  return Reduction(run, {run.load_cell, run.header}).transitions();
+}
 
 RunViews views_of(const RunRecording& run, const LoadCellColumns& cell) {
   RunViews views{sample_times(run, cell), {}};
