@@ -121,18 +121,19 @@ class PeriodicThread {
 }  // namespace
 
 LiveMotor::LiveMotor(const profiles::MotorConfig& config, const Clock& clock, const StopAsked& stop_asked)
-    : config_(config), clock_(clock), motor_(connect(stop_asked)), identity_(motor_->identity().summary()) {
-  const bool newer = motor_->identity().value<"coil_temperature_estimator.t_coil">().has_value();
+    : config_(config), clock_(clock), owned_(connect(stop_asked)), identity_(owned_->identity().summary()) {
+  const bool newer = owned_->identity().value<"coil_temperature_estimator.t_coil">().has_value();
   const auto ask = [&](auto asked) {
     require_no_stop(stop_asked, kWhileConnecting);
-    return motor_->inquire(std::move(asked));
+    return owned_->inquire(std::move(asked));
   };
   parameters_ = iq::read_audit(ask, newer);
+  motor_ = owned_.get();
 }
 
-std::shared_ptr<iq::Motor> LiveMotor::connect(const StopAsked& stop_asked) const {
+std::unique_ptr<iq::Motor> LiveMotor::connect(const StopAsked& stop_asked) const {
   try {
-    auto motor = std::make_shared<iq::Motor>(config_.device, config_.baud, motor_settings(config_), clock_,
+    auto motor = std::make_unique<iq::Motor>(config_.device, config_.baud, motor_settings(config_), clock_,
                                              config_.capture, stop_asked);
     (void)motor->take_events();  // that it is connected
     return motor;
@@ -142,74 +143,91 @@ std::shared_ptr<iq::Motor> LiveMotor::connect(const StopAsked& stop_asked) const
   }
 }
 
-std::shared_ptr<iq::Motor> LiveMotor::connected() const {
-  if (auto motor = this->motor()) return motor;
+iq::Motor& LiveMotor::connected() const {
+  if (iq::Motor* motor = motor_) return *motor;
   throw DeviceError("motor module on " + config_.device, "spin", "the module has no power");
+}
+
+void LiveMotor::rest() {
+  motor_ = nullptr;
+  stop_.reset();
+  if (!owned_) return;
+  owned_->close();
+  closed_ = std::move(owned_);
 }
 
 void LiveMotor::wake(const StopAsked& stop_asked) {
   rest();
   const auto give_up = std::chrono::steady_clock::now() + kBootTime;
-  for (std::shared_ptr<iq::Motor> found; !found;) {
+  while (!owned_) {
     try {
-      found = connect(stop_asked);
+      owned_ = connect(stop_asked);
     } catch (const DeviceError&) {
       if (std::chrono::steady_clock::now() > give_up) throw;
       std::this_thread::sleep_for(kDrainWall);  // it may still be booting
       continue;
     }
-    if (const std::string now = found->identity().summary(); now != identity_)
+    if (const std::string now = owned_->identity().summary(); now != identity_) {
+      owned_.reset();
       throw DeviceError("motor module on " + config_.device, "connect again",
                         fmt::format("a different module answers: {} instead of {}", now, identity_));
-    std::atomic_store(&motor_, std::move(found));
-    return;
+    }
   }
+  motor_ = owned_.get();
 }
 
 void LiveMotor::renew() noexcept {
-  if (const auto motor = this->motor()) motor->renew();
+  if (iq::Motor* motor = motor_) motor->renew();
 }
 
 void LiveMotor::emergency_stop() noexcept {
-  if (const auto motor = this->motor()) motor->emergency_stop();
+  if (iq::Motor* motor = motor_) motor->emergency_stop();
 }
 
 void LiveMotor::begin_stop(const iq::StopSettings& settings) {
-  if (stop_.valid() && !stop_report()) return;
+  if (stop_ && !stop_report()) return;
   stop_report_.reset();
-  stop_ = std::async(std::launch::async,
-                     [motor = motor(), settings] { return motor ? motor->stop(settings) : iq::StopReport{}; });
+  stop_.reset();
+  if (iq::Motor* motor = motor_)
+    stop_ = motor->begin_stop(settings);
+  else
+    stop_report_ = iq::StopReport{};
 }
 
 std::optional<iq::StopReport> LiveMotor::stop_report() {
-  if (stop_.valid() && stop_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) stop_report_ = stop_.get();
+  iq::Motor* const motor = motor_;
+  if (stop_ && motor != nullptr) {
+    motor->renew();  // whoever asks is alive
+    stop_report_ = motor->stop_report(*stop_);
+    if (stop_report_) stop_.reset();
+  }
   return stop_report_;
 }
 
 std::optional<Celsius> LiveMotor::coil_temperature() {
-  return ask_coil_temperature(parameters_, [this](auto asked) { return connected()->inquire(std::move(asked)); });
+  return ask_coil_temperature(parameters_, [this](auto asked) { return connected().inquire(std::move(asked)); });
 }
 
 results::MotorCounts LiveMotor::counts() const {
-  const auto connected = motor();
-  return connected ? to_counts(connected->counters()) : results::MotorCounts{};
+  const iq::Motor* const motor = motor_;
+  return motor != nullptr ? to_counts(motor->counters()) : results::MotorCounts{};
 }
 
 std::vector<StreamEvent> LiveMotor::take_events() {
-  const auto motor = this->motor();
-  return motor ? to_events(motor->take_events()) : std::vector<StreamEvent>();
+  iq::Motor* const motor = motor_;
+  return motor != nullptr ? to_events(motor->take_events()) : std::vector<StreamEvent>();
 }
 
 std::size_t LiveMotor::take(std::span<MotorReading> out) {
-  const auto motor = this->motor();
-  return motor ? motor->take(out) : 0;
+  iq::Motor* const motor = motor_;
+  return motor != nullptr ? motor->take(out) : 0;
 }
 
 std::string LiveMotor::failure() const {
-  const auto motor = this->motor();
-  if (!motor) return "";
+  const iq::Motor* const motor = motor_;
+  if (motor == nullptr) return "";
   if (const std::string failure = motor->failure(); !failure.empty()) return "motor: " + failure;
-  if (motor->counters().lease_expiries == 0) return "";
+  if (!motor->lease_has_expired()) return "";
   return "motor: kphi did not renew its command in time, so the driver coasted it; close other programs";
 }
 

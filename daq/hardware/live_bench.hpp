@@ -1,8 +1,8 @@
 // The bench over its real transports: Net Box over UDP and HTTP, motor module over a serial line, a steady clock.
 #pragma once
 
+#include <atomic>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -24,9 +24,9 @@ class LiveMotor final : public MotorLink {
  public:
   /// Connects and reads the module's parameters. Throws DeviceError, Interrupted.
   LiveMotor(const profiles::MotorConfig& config, const Clock& clock, const StopAsked& stop_asked);
-  void rest() override { std::atomic_store(&motor_, std::shared_ptr<iq::Motor>()); }
+  void rest() override;
   void wake(const StopAsked& stop_asked) override;
-  void spin_at(RadPerSec signed_speed) override { connected()->spin_at(signed_speed); }
+  void spin_at(RadPerSec signed_speed) override { connected().spin_at(signed_speed); }
   void renew() noexcept override;
   void emergency_stop() noexcept override;
   void begin_stop(const iq::StopSettings& settings) override;
@@ -40,17 +40,18 @@ class LiveMotor final : public MotorLink {
   [[nodiscard]] std::string identity() const override { return identity_; }
 
  private:
-  [[nodiscard]] std::shared_ptr<iq::Motor> motor() const noexcept { return std::atomic_load(&motor_); }
-  [[nodiscard]] std::shared_ptr<iq::Motor> connected() const;
-  [[nodiscard]] std::shared_ptr<iq::Motor> connect(const StopAsked& stop_asked) const;
+  /// Throws DeviceError while it rests.
+  [[nodiscard]] iq::Motor& connected() const;
+  [[nodiscard]] std::unique_ptr<iq::Motor> connect(const StopAsked& stop_asked) const;
 
   const profiles::MotorConfig config_;
   const Clock& clock_;
-  std::shared_ptr<iq::Motor> motor_;  ///< null while it rests; read by any thread
+  std::unique_ptr<iq::Motor> owned_, closed_;  ///< the runner's; closed_: another thread may still be at it
+  std::atomic<iq::Motor*> motor_{nullptr};     ///< null while it rests; for any thread
   std::string identity_;
   iq::AuditRecord parameters_;
+  std::optional<std::uint64_t> stop_;  ///< its ticket
   std::optional<iq::StopReport> stop_report_;
-  std::future<iq::StopReport> stop_;  ///< last member: its destructor waits for the stop under way
 };
 
 class LiveLoadCell final : public LoadCellLink {

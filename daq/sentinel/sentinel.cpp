@@ -196,13 +196,13 @@ void Sentinel::replace(const std::string& why) {
 
 std::string Sentinel::failure() const {
   if (!has_failed_) return "";
-  const std::lock_guard lock(mutex_);
-  return failure_;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock ? failure_ : "the sentinel is gone";
 }
 
 std::vector<std::string> Sentinel::take_news() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(news_, {});
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock ? std::exchange(news_, {}) : std::vector<std::string>();
 }
 
 }  // namespace kphi::daq

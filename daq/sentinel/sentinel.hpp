@@ -31,7 +31,7 @@ class Sentinel {
   Sentinel& operator=(const Sentinel&) = delete;
   /// Thread-safe, as are the other members.
   [[nodiscard]] pid_t process() const noexcept { return process_; }
-  /// Why there is none; empty: one watches.
+  /// Why there is none; empty: one watches. Waits for no thread, nor does take_news.
   [[nodiscard]] std::string failure() const;
   /// One line for each that was replaced since the last call.
   [[nodiscard]] std::vector<std::string> take_news();

@@ -1,11 +1,18 @@
 #include "drivers/supply/worker.hpp"
 
+#include <poll.h>
+
 #include <stdexcept>
 #include <utility>
 
 #include "base/thread.hpp"
 
 namespace kphi::supply {
+namespace {
+
+constexpr std::chrono::milliseconds kMissedWord{5};
+
+}  // namespace
 
 Worker::Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_per_second)
     : supply_(std::move(supply)),
@@ -15,11 +22,8 @@ Worker::Worker(std::unique_ptr<Supply> supply, const Clock& clock, double looks_
       thread_(start_thread({"supply", true}, [this] { run(); })) {}
 
 Worker::~Worker() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_asked_ = true;
-  }
-  changed_.notify_all();
+  stop_asked_ = true;
+  ordered_.raise();
   thread_.join();
 }
 
@@ -44,26 +48,24 @@ void Worker::ask(std::function<void()> act) {
     orders_.push_back({std::move(act), {}});
     coming = orders_.back().answer.get_future();
   }
-  changed_.notify_all();
+  ordered_.raise();
   const Answer answer = coming.get();
   if (answer.unfit) throw std::invalid_argument(answer.failure);
   if (!answer.failure.empty()) throw DeviceError(answer.failure);
 }
 
 std::uint64_t Worker::switch_off() noexcept {
-  std::uint64_t mine = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    mine = ++offs_asked_;
-  }
-  changed_.notify_all();
+  const std::uint64_t mine = ++offs_asked_;
+  ordered_.raise();
   return mine;
 }
 
 bool Worker::switch_off_and_confirm(Duration wall) noexcept {
   const std::uint64_t mine = switch_off();
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, wall, [&] { return offs_done_ >= mine || ended_; });
+  const auto give_up = std::chrono::steady_clock::now() + wall;
+  // The thread notifies without the lock, so that it never waits for this one: such a word can be missed.
+  for (std::unique_lock lock(mutex_); offs_done_ < mine && !ended_ && std::chrono::steady_clock::now() < give_up;)
+    changed_.wait_for(lock, kMissedWord);
   return offs_done_ >= mine;
 }
 
@@ -83,28 +85,34 @@ void Worker::run() noexcept {
   }));
 }
 
+void Worker::await_order() noexcept {
+  const timespec left = to_timespec(clock_.shrunk(std::max(Duration{0}, next_look_ - clock_.now())));
+  pollfd order{ordered_.descriptor(), POLLIN, 0};
+  if (::ppoll(&order, 1, &left, nullptr) > 0) ordered_.clear();
+}
+
 /// Waits for an order or until the next reading is due, and carries out the orders. False: the worker is to end. Throws
 /// if the output was not reported off.
 bool Worker::serve() {
-  std::unique_lock lock(mutex_);
-  const auto asked = [&] { return stop_asked_ || !orders_.empty() || offs_asked_ != offs_done_; };
-  changed_.wait_for(lock, clock_.shrunk(std::max(Duration{0}, next_look_ - clock_.now())), asked);
-  if (stop_asked_) return false;
-  if (const std::uint64_t offs = offs_asked_; offs != offs_done_) {
-    lock.unlock();
-    if (const std::string why = turn_off(); !why.empty()) throw std::runtime_error(why);
-    lock.lock();
-    offs_done_ = offs;
-    changed_.notify_all();
+  await_order();
+  for (;;) {
+    if (stop_asked_) return false;
+    if (const std::uint64_t offs = offs_asked_; offs != offs_done_) {
+      if (const std::string why = turn_off(); !why.empty()) throw std::runtime_error(why);
+      offs_done_ = offs;
+      changed_.notify_all();
+    }
+    std::optional<Order> order;
+    {
+      const std::unique_lock lock(mutex_, std::try_to_lock);  // of a caller that stands still: later
+      if (lock && !orders_.empty()) {
+        order.emplace(std::move(orders_.front()));
+        orders_.pop_front();
+      }
+    }
+    if (!order) return !stop_asked_;
+    order->answer.set_value(answer_to(order->act));
   }
-  while (!orders_.empty()) {
-    Order order = std::move(orders_.front());
-    orders_.pop_front();
-    lock.unlock();
-    order.answer.set_value(answer_to(order.act));
-    lock.lock();
-  }
-  return !stop_asked_;
 }
 
 Worker::Answer Worker::answer_to(const std::function<void()>& act) {
@@ -131,8 +139,7 @@ std::string Worker::turn_off() noexcept {
 void Worker::look() {
   const SupplyReading reading = supply_->read();
   queue_.push(reading);
-  const std::lock_guard lock(mutex_);
-  newest_ = reading;
+  newest_.publish(reading);
 }
 
 void Worker::finish(std::string why) noexcept {

@@ -20,6 +20,8 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "base/published.hpp"
+#include "base/wakeup.hpp"
 #include "drivers/supply/supply.hpp"
 
 namespace kphi::supply {
@@ -40,7 +42,7 @@ class Worker {
   }
   /// Returns with the output on. A switch_off() after this call overrules it, with DeviceError.
   void switch_on();
-  /// Any thread; does not wait. Returns the number of this request.
+  /// Any thread; takes no lock: an atomic word and an eventfd. Returns the number of this request.
   std::uint64_t switch_off() noexcept;
   /// Any thread: as switch_off, then waits for the device to report it. False after `wall` or when the supply has
   /// failed: the output may be on.
@@ -49,15 +51,19 @@ class Worker {
   /// Oldest readings first; one consumer thread. Holds 4096, 17 minutes at 4 Hz; further ones are dropped.
   std::size_t take(std::span<SupplyReading> out);
   /// Any thread.
-  [[nodiscard]] std::optional<SupplyReading> newest() const { return copy_of(newest_); }
+  [[nodiscard]] std::optional<SupplyReading> newest() const {
+    const SupplyReading reading = newest_.read();
+    return reading.time_ns == 0 ? std::nullopt : std::optional(reading);
+  }
   /// Read at construction.
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
   /// False once the supply has failed; stays false.
-  [[nodiscard]] bool alive() const { return !copy_of(ended_); }
+  [[nodiscard]] bool alive() const noexcept { return !ended_; }
   /// Why it is not alive, and whether the output may still be on.
   [[nodiscard]] std::string failure() const { return copy_of(failure_); }
 
  private:
+  friend struct LockOfWorker;  // of a test that stands still in it
   /// Text instead of an exception, which cannot leave its thread.
   struct Answer {
     std::string failure;  ///< empty: done
@@ -80,6 +86,7 @@ class Worker {
   void run() noexcept;
   [[nodiscard]] static Answer answer_to(const std::function<void()>& act);
   [[nodiscard]] bool serve();
+  void await_order() noexcept;
   [[nodiscard]] std::string turn_off() noexcept;
   void look();
   void finish(std::string why) noexcept;
@@ -97,12 +104,13 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Order> orders_;
-  std::atomic<std::uint64_t> offs_asked_{0};  // changed under the lock, too, so that the thread wakes up
-  std::uint64_t offs_done_ = 0;
-  bool stop_asked_ = false;
-  bool ended_ = false;
   std::string failure_;
-  std::optional<SupplyReading> newest_;
+
+  // Without the lock: nothing that switches off waits for a caller.
+  Wakeup ordered_;
+  std::atomic<std::uint64_t> offs_asked_{0}, offs_done_{0};
+  std::atomic<bool> stop_asked_{false}, ended_{false};
+  Published<SupplyReading> newest_;
 
   boost::lockfree::spsc_queue<SupplyReading, boost::lockfree::capacity<4096>> queue_;
   std::thread thread_;

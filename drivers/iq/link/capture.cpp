@@ -43,6 +43,7 @@ Capture::Capture(const std::string& path)
 Capture::~Capture() {
   {
     const std::lock_guard lock(mutex_);
+    hand_over();
     ended_ = true;
   }
   news_.notify_one();
@@ -50,23 +51,31 @@ Capture::~Capture() {
 }
 
 void Capture::add(Direction direction, std::span<const std::uint8_t> bytes, Instant time) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (waiting_.size() + bytes.size() + 2 * kRecordHead > kMostWaiting) {
-      gap_ = true;
-      return;
-    }
+  if (queued_ + collected_.size() + bytes.size() + 2 * kRecordHead > kMostWaiting) {
+    gap_ = true;
+  } else {
     if (std::exchange(gap_, false)) put(Direction::missing, {}, time);
     put(direction, bytes, time);
+  }
+  {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return;
+    hand_over();
   }
   news_.notify_one();
 }
 
 void Capture::put(Direction direction, std::span<const std::uint8_t> bytes, Instant time) {
-  waiting_.push_back(static_cast<std::uint8_t>(direction));
-  append(waiting_, static_cast<std::uint64_t>(time.count()), 8);
-  append(waiting_, bytes.size(), 4);
-  waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
+  collected_.push_back(static_cast<std::uint8_t>(direction));
+  append(collected_, static_cast<std::uint64_t>(time.count()), 8);
+  append(collected_, bytes.size(), 4);
+  collected_.insert(collected_.end(), bytes.begin(), bytes.end());
+}
+
+void Capture::hand_over() {
+  waiting_.insert(waiting_.end(), collected_.begin(), collected_.end());
+  collected_.clear();
+  queued_ = waiting_.size();
 }
 
 void Capture::run() noexcept {

@@ -26,20 +26,27 @@ class Capture {
   explicit Capture(const std::string& path);
   ~Capture();
 
-  /// From one thread; never waits for the disk.
+  /// From one thread; waits for no disk and no other thread.
   void add(Direction direction, std::span<const std::uint8_t> bytes, Instant time);
 
  private:
+  friend struct LockOfCapture;  // of a test that stands still in it
   static constexpr std::size_t kMostWaiting = 4 << 20;
   void run() noexcept;
   void put(Direction direction, std::span<const std::uint8_t> bytes, Instant time);
+  /// Under the lock.
+  void hand_over();
 
   Descriptor file_;
-  std::mutex mutex_;  ///< the line's thread and the writer
+  // The line's thread.
+  std::vector<std::uint8_t> collected_;
+  std::size_t queued_ = 0;  ///< bytes of waiting_, as last seen
+  bool gap_ = false;
+
+  std::mutex mutex_;  ///< the line's thread and the writer: the rest
   std::condition_variable news_;
   std::vector<std::uint8_t> waiting_;
   bool ended_ = false;
-  bool gap_ = false;
   std::thread writer_;
 };
 

@@ -23,6 +23,7 @@ constexpr auto kGiveUpEvery = std::chrono::milliseconds(20);
 constexpr auto kFinalCoastLimit = std::chrono::milliseconds(200);
 constexpr auto kLongestSleep = std::chrono::seconds(1);
 constexpr auto kFirstPause = std::chrono::milliseconds(50);
+constexpr auto kRetry = std::chrono::milliseconds(5);  // of what a caller was at
 constexpr auto kLongestPause = std::chrono::seconds(1);
 
 /// Returns the pause and doubles it.
@@ -136,12 +137,13 @@ class Link {
     try {
       transmit();
       motor_.move_readings(session_);
-      motor_.publish(session_, port_ != nullptr);
+      contended_ = !motor_.publish(session_, port_ != nullptr);
       const auto [by_command, by_port] = sleep();
       notice_sleep();
       if (by_port) receive();
       session_.advance(clock_.now());
-      if (by_command) apply(motor_.take_commands());
+      if (by_command) has_commands_ = true;
+      if (has_commands_) take_commands();
       keep_lease();
     } catch (const serial::PortGone& gone) {
       lose(gone.what());
@@ -169,6 +171,7 @@ class Link {
     const Instant deadline = session_.deadline();
     if (deadline != kNever) due = std::min(due, now + clock_.shrunk(std::max(deadline - clock_.now(), Duration{0})));
     if (session_.spinning()) due = std::min(due, motor_.lease_end());
+    if (contended_ || has_commands_) due = std::min(due, now + kRetry);
     if (session_.state() == Session::State::failed && next_attempt_ > now) due = std::min(due, next_attempt_);
     return due;
   }
@@ -185,12 +188,19 @@ class Link {
     }
   }
 
+  void take_commands() {
+    if (motor_.take_coast()) session_.emergency_stop(clock_.now());
+    const std::optional<Commands> commands = motor_.take_commands();
+    has_commands_ = !commands;
+    if (commands) apply(*commands);
+  }
+
   void apply(const Commands& commands) {
     const Instant now = clock_.now();
-    if (commands.coast) session_.emergency_stop(now);
-    if (commands.stop) session_.stop(*commands.stop, now);
+    const bool is_void = commands.after_coasts < motor_.coasts_asked_;  // a coast was asked for afterwards
+    if (commands.stop && !is_void) session_.stop(*commands.stop, now);
     if (commands.inquiry && session_.state() == Session::State::ready) session_.inquire(*commands.inquiry, now);
-    if (!commands.speed || !session_.armed()) return;
+    if (!commands.speed || is_void || !session_.armed()) return;
     if (steady_clock::now() < motor_.lease_end()) {
       session_.spin_at(*commands.speed, now);
     } else {
@@ -270,7 +280,8 @@ class Link {
   std::unique_ptr<serial::Port> port_;  ///< null while it is lost
   Session session_;
   std::unique_ptr<Capture> capture_;
-  bool congested_ = false;  ///< the port had no room for all
+  bool congested_ = false;                         ///< the port had no room for all
+  bool has_commands_ = false, contended_ = false;  ///< to be taken, to be published: once no caller is at them
   steady_clock::time_point next_attempt_{};
   Duration reopening_ = kFirstPause, reconnecting_ = kFirstPause;  ///< the next pauses
   bool was_ready_ = false;
@@ -283,6 +294,12 @@ Motor::Motor(const std::string& device, unsigned baud, const Settings& settings,
              const std::string& capture, const std::function<bool()>& give_up)
     : device_(device), link_(std::make_unique<Link>(*this, baud, settings, clock, capture, give_up)) {}
 
-Motor::~Motor() { (void)await_coast(order_coast(), kStopLimit); }
+Motor::~Motor() { close(); }
+
+void Motor::close() noexcept {
+  if (!link_) return;
+  (void)await_coast(order_coast(), kStopLimit);
+  link_.reset();
+}
 
 }  // namespace kphi::iq

@@ -26,6 +26,7 @@ void Motor::spin_at(RadPerSec signed_speed) {
     if (!alive_) refuse("spin", ended_ ? "connect again" : "find the cause, then connect again");
     renew();
     commands_.speed = signed_speed;
+    commands_.after_coasts = coasts_asked_;
     commands_.stop.reset();
   }
   commanded_.raise();
@@ -36,31 +37,38 @@ void Motor::renew() noexcept {
 }
 
 std::uint64_t Motor::order_coast() noexcept {
-  std::uint64_t ticket = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    commands_.speed.reset();
-    commands_.stop.reset();
-    commands_.coast = true;
-    ticket = ++coasts_.asked;
-  }
+  const std::uint64_t ticket = ++coasts_asked_;  // voids every speed of before
   commanded_.raise();
   return ticket;
 }
 
 bool Motor::await_coast(std::uint64_t ticket, Duration wall) noexcept {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, wall, [&] { return ended_ || !line_ || coasts_.done >= ticket; });
-  return coasts_.done >= ticket;
+  changed_.wait_for(lock, wall, [&] { return ended_ || !line_ || coasts_done_ >= ticket; });
+  return coasts_done_ >= ticket;
+}
+
+std::uint64_t Motor::begin_stop(const StopSettings& settings) {
+  Stopping::check(settings);
+  const std::lock_guard lock(mutex_);
+  commands_.speed.reset();
+  commands_.stop = settings;
+  commands_.after_coasts = coasts_asked_;
+  const std::uint64_t ticket = ++stops_.asked;
+  renew();
+  commanded_.raise();
+  return ticket;
+}
+
+std::optional<StopReport> Motor::stop_report(std::uint64_t ticket) const {
+  const std::lock_guard lock(mutex_);
+  if (stops_.done >= ticket) return stop_report_;
+  return ended_ ? std::optional(StopReport{}) : std::nullopt;
 }
 
 StopReport Motor::stop(const StopSettings& settings) {
-  Stopping::check(settings);
+  const std::uint64_t ticket = begin_stop(settings);
   std::unique_lock lock(mutex_);
-  commands_.speed.reset();
-  commands_.stop = settings;
-  const std::uint64_t ticket = ++stops_.asked;
-  commanded_.raise();
   // A caller that waits here is alive.
   do {
     renew();
@@ -82,8 +90,14 @@ std::vector<Reply> Motor::inquire(std::vector<Inquiry> inquiries) {
 }
 
 std::vector<StreamEvent> Motor::take_events() {
-  const std::lock_guard lock(mutex_);
-  return std::exchange(events_, {});
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock ? std::exchange(events_, {}) : std::vector<StreamEvent>();
+}
+
+std::string Motor::failure() const {
+  if (!has_failed_) return "";
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock ? failure_ : "its link does not answer";
 }
 
 void Motor::refuse(const char* operation, const char* next_move) const {
@@ -91,9 +105,15 @@ void Motor::refuse(const char* operation, const char* next_move) const {
                     next_move);
 }
 
-Commands Motor::take_commands() {
-  const std::lock_guard lock(mutex_);
-  for (Ticket* ticket : {&coasts_, &stops_, &inquiries_}) ticket->taken = ticket->asked;
+bool Motor::take_coast() noexcept {
+  const std::uint64_t asked = coasts_asked_;
+  return asked != std::exchange(coasts_taken_, asked);
+}
+
+std::optional<Commands> Motor::take_commands() {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock) return std::nullopt;
+  for (Ticket* ticket : {&stops_, &inquiries_}) ticket->taken = ticket->asked;
   return std::exchange(commands_, {});
 }
 
@@ -102,10 +122,11 @@ void Motor::move_readings(Session& session) {
   while (const std::size_t n = session.take(batch)) dropped_readings_ += n - readings_.push(batch.data(), n);
 }
 
-void Motor::publish(Session& session, bool line) {
+bool Motor::publish(Session& session, bool line) {
   bool news = false;
   {
-    const std::lock_guard lock(mutex_);
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock) return false;
     news = note_state(session);
     if (line != std::exchange(line_, line)) news = true;
     if (close_tickets(session)) news = true;
@@ -120,10 +141,14 @@ void Motor::publish(Session& session, bool line) {
     round_trips_ = session.round_trips();
   }
   if (news) changed_.notify_all();
+  return true;
 }
 
 bool Motor::note_state(const Session& session) {
-  if (!session.failure().empty()) failure_ = session.failure();
+  if (!session.failure().empty()) {
+    failure_ = session.failure();
+    has_failed_ = true;
+  }
   const bool alive = session.armed() || (alive_ && session.state() == Session::State::connecting);
   const bool news = state_ != session.state() || alive_ != alive;
   state_ = session.state();
@@ -139,7 +164,10 @@ bool Motor::close_tickets(const Session& session) {
     ticket.done = ticket.taken;
     return news = true;
   };
-  close(coasts_, session.coasting());
+  if (coasts_done_ != coasts_taken_ && session.coasting()) {
+    coasts_done_ = coasts_taken_;
+    news = true;
+  }
   if (close(stops_, !session.stopping() && session.stop_report().has_value())) stop_report_ = *session.stop_report();
   if (close(inquiries_, session.inquiries().done())) replies_ = session.inquiries().replies();
   return news;
@@ -149,7 +177,7 @@ void Motor::end(const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
     if (failure_.empty()) failure_ = why;
-    ended_ = true;
+    ended_ = has_failed_ = true;
     alive_ = false;
   }
   changed_.notify_all();

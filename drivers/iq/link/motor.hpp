@@ -33,7 +33,7 @@ inline constexpr Duration kLease = std::chrono::milliseconds(500);
 /// The commands of callers to the link's thread.
 struct Commands {
   std::optional<RadPerSec> speed;
-  bool coast = false;
+  std::uint64_t after_coasts = 0;  ///< of the speed: how many coasts had been asked for before it
   std::optional<StopSettings> stop;
   std::optional<std::vector<Inquiry>> inquiry;
 };
@@ -51,8 +51,11 @@ class Motor {
   /// (Settings) is never alive.
   Motor(const std::string& device, unsigned baud, const Settings& settings, const Clock& clock,
         const std::string& capture = {}, const std::function<bool()>& give_up = {});
-  /// Coasts three times, waits at most 0.6 s for drive mode coast, closes.
+  /// Closes.
   ~Motor();
+  /// Coasts three times, waits at most 0.6 s for drive mode coast, closes the port. Afterwards other threads may still
+  /// call any member. The thread that made it; again without effect.
+  void close() noexcept;
 
   // Callers; any thread unless it says otherwise.
 
@@ -62,10 +65,15 @@ class Motor {
   /// The caller is alive. Never restarts a motor that has been coasted.
   void renew() noexcept;
   /// Coasts, three times at once. Overrules a spin_at that returned before.
+  /// Takes no lock: an atomic word and an eventfd, whatever another thread is doing.
   void emergency_stop() noexcept { order_coast(); }
   /// Ramps down, coasts, and waits until the motor is at rest or the settings' limit is over; keeps the lease
   /// meanwhile. Throws std::invalid_argument for settings that make no sense. Always ends coasting.
   [[nodiscard]] StopReport stop(const StopSettings& settings = {});
+  /// As stop(), without waiting: its ticket. The caller renews the lease meanwhile.
+  [[nodiscard]] std::uint64_t begin_stop(const StopSettings& settings);
+  /// nullopt while that stop is under way.
+  [[nodiscard]] std::optional<StopReport> stop_report(std::uint64_t ticket) const;
 
   /// Asks the module for these, between the polls; absent entries stay without a value. Blocks, at most 20 s. Throws
   /// std::invalid_argument for what is not a number or must not be set in passing (is_volatile_setting), DeviceError
@@ -75,12 +83,14 @@ class Motor {
   /// Oldest readings first; one consumer thread. Holds 16384, about 160 s at 50 Hz; further ones are dropped and
   /// counted.
   std::size_t take(std::span<MotorReading> out) { return readings_.pop(out.data(), out.size()); }
-  /// What happened, oldest first. 256 are kept.
+  /// What happened, oldest first. 256 are kept. Empty, too, while another thread is at them: they come next time.
   [[nodiscard]] std::vector<StreamEvent> take_events();
   /// False once the port is gone, the module stopped answering or restarted, or a coast stayed unconfirmed.
   [[nodiscard]] bool alive() const noexcept { return alive_; }
-  /// Why it is not alive: the newest failure.
-  [[nodiscard]] std::string failure() const { return copy_of(failure_); }
+  /// Why it is not alive: the newest failure. Without waiting.
+  [[nodiscard]] std::string failure() const;
+  /// A caller did not renew its command in time. Without waiting.
+  [[nodiscard]] bool lease_has_expired() const noexcept { return lease_expiries_ != 0; }
   [[nodiscard]] const std::string& device() const noexcept { return device_; }
   [[nodiscard]] AuditRecord identity() const { return copy_of(identity_); }
   [[nodiscard]] Counters counters() const { return copy_of(counters_); }
@@ -88,6 +98,7 @@ class Motor {
 
  private:
   friend class Link;
+  friend struct LockOfMotor;  // of a test that stands still in it
   using WallTime = std::chrono::steady_clock::time_point;
   struct Ticket {
     std::uint64_t asked = 0, taken = 0, done = 0;
@@ -106,11 +117,14 @@ class Motor {
   [[noreturn]] void refuse(const char* operation, const char* next_move) const;
   [[nodiscard]] bool lost() const noexcept { return ended_ || state_ == Session::State::failed; }
 
-  // The link's thread.
-  [[nodiscard]] Commands take_commands();
+  // The link's thread, which waits for nobody.
+  /// True: somebody has asked for a coast since.
+  [[nodiscard]] bool take_coast() noexcept;
+  /// nullopt while a caller is at them: later.
+  [[nodiscard]] std::optional<Commands> take_commands();
   void move_readings(Session& session);
-  /// Shows callers the state of the session. `line`: there is a port.
-  void publish(Session& session, bool line);
+  /// Shows callers the state of the session. `line`: there is a port. False while a caller is at it: later.
+  [[nodiscard]] bool publish(Session& session, bool line);
   /// No thread serves this motor any more.
   void end(const std::string& why);
   [[nodiscard]] WallTime lease_end() const noexcept { return WallTime(std::chrono::nanoseconds(lease_end_ns_)); }
@@ -124,7 +138,7 @@ class Motor {
   mutable std::mutex mutex_;  ///< callers and the link's thread: everything down to the atomics
   std::condition_variable changed_;
   Commands commands_;
-  Ticket coasts_, stops_, inquiries_;
+  Ticket stops_, inquiries_;
   StopReport stop_report_;
   std::vector<Reply> replies_;
   Session::State state_ = Session::State::idle;
@@ -135,9 +149,10 @@ class Motor {
   DelayHistogram round_trips_;
   std::vector<StreamEvent> events_;
 
-  std::uint64_t dropped_readings_ = 0, lease_expiries_ = 0, reconnections_ = 0;  ///< the link's thread
-  std::atomic<std::int64_t> lease_end_ns_{0};                                    ///< steady_clock
-  std::atomic<bool> alive_{true};
+  std::uint64_t dropped_readings_ = 0, reconnections_ = 0, coasts_taken_ = 0;  ///< the link's thread
+  std::atomic<std::uint64_t> coasts_asked_{0}, coasts_done_{0}, lease_expiries_{0};
+  std::atomic<std::int64_t> lease_end_ns_{0};  ///< steady_clock
+  std::atomic<bool> alive_{true}, has_failed_{false};
   boost::lockfree::spsc_queue<MotorReading> readings_{16384};
   std::unique_ptr<Link> link_;  ///< last: its thread uses the members above
 };

@@ -14,8 +14,14 @@
 #include "base/error.hpp"
 #include "drivers/supply/modbus_supply.hpp"
 #include "test/drivers/supply/simulated_supply.hpp"
+#include "test/held_lock.hpp"
 
 namespace kphi::supply {
+
+struct LockOfWorker : kphi::test::HeldLock {
+  explicit LockOfWorker(Worker& worker) : HeldLock(worker.mutex_) {}
+};
+
 namespace worker_test {
 
 using namespace std::chrono_literals;
@@ -222,6 +228,15 @@ TEST_F(SupplyWorker, SwitchesOffWhenAskedAndGoesOn) {
   EXPECT_TRUE(worker.alive());
   worker.switch_on();
   EXPECT_TRUE(script.output);
+}
+
+TEST_F(SupplyWorker, SwitchesOffWhileAnotherThreadStandsStillInItsLock) {
+  Worker worker(fake(script), fast);
+  worker.switch_on();
+  const LockOfWorker held(worker);
+  worker.switch_off();
+  EXPECT_TRUE(soon([&] { return !script.output; }));
+  EXPECT_TRUE(worker.alive()) << "and the guard waits for nobody";
 }
 
 TEST_F(SupplyWorker, HandsFailuresToWhoHasAsked) {

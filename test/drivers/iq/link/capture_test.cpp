@@ -9,9 +9,15 @@
 #include "drivers/iq/link/motor.hpp"
 #include "drivers/iq/wire/packet.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/held_lock.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::iq {
+
+struct LockOfCapture : kphi::test::HeldLock {
+  explicit LockOfCapture(Capture& capture) : HeldLock(capture.mutex_) {}
+};
+
 namespace capture_test {
 
 using namespace std::chrono_literals;
@@ -92,6 +98,17 @@ TEST_F(CaptureOnDisk, MarksWhatItCouldNotTake) {
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[0].direction, Direction::missing);
   EXPECT_EQ(records[1].bytes, fake::Bytes{1});
+}
+
+TEST_F(CaptureOnDisk, DelaysNoLineWhileItsWriterStandsStillInTheLock) {
+  {
+    Capture capture(path);
+    const LockOfCapture held(capture);
+    for (std::uint8_t i = 0; i < 3; ++i) capture.add(Direction::came, fake::Bytes{i}, Instant(i));
+  }
+  const auto records = read_capture(path);
+  ASSERT_EQ(records.size(), 3u) << "and nothing is missing afterwards";
+  EXPECT_EQ(records[2].bytes, fake::Bytes{2});
 }
 
 TEST_F(CaptureOnDisk, OfAMotorGoesThroughTheParserBitByBit) {

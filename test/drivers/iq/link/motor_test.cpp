@@ -10,10 +10,16 @@
 
 #include "base/error.hpp"
 #include "test/drivers/iq/module_on_a_line.hpp"
+#include "test/held_lock.hpp"
 #include "test/refusal.hpp"
 #include "test/soon.hpp"
 
 namespace kphi::iq {
+
+struct LockOfMotor : kphi::test::HeldLock {
+  explicit LockOfMotor(Motor& motor) : HeldLock(motor.mutex_) {}
+};
+
 namespace motor_test {
 
 using namespace std::chrono_literals;
@@ -87,6 +93,45 @@ TEST(Motor, TakesOnlyTheLastOfManyCommandsWhenItCannotKeepUp) {
   Stand stand;
   for (int i = 1; i <= 1000; ++i) stand.motor->spin_at(RadPerSec(i));
   EXPECT_TRUE(stand.line.heard_a_speed(1000));
+}
+
+TEST(Motor, CoastsWhileAnotherThreadStandsStillInItsLock) {
+  Stand stand;
+  stand.spin(700);
+  const LockOfMotor held(*stand.motor);
+  stand.motor->emergency_stop();
+  EXPECT_TRUE(soon([&] { return stand.line.left_coasting(); }, 500ms));
+  EXPECT_EQ(stand.motor->failure(), "") << "and the guard waits for nobody";
+  EXPECT_TRUE(stand.motor->take_events().empty());
+}
+
+TEST(Motor, CoastsByItsLeaseWhileItsCallerStandsStillInItsLock) {
+  Stand stand;
+  stand.spin(700);
+  const LockOfMotor held(*stand.motor);
+  EXPECT_TRUE(soon([&] { return stand.line.left_coasting(); }, 2000ms));
+  EXPECT_TRUE(stand.motor->lease_has_expired());
+}
+
+TEST(Motor, VoidsEachSpeedOfBeforeACoast) {
+  Stand stand;
+  for (int i = 0; i < 200; ++i) {
+    stand.motor->spin_at(RadPerSec(300 + i));
+    stand.motor->emergency_stop();
+  }
+  EXPECT_TRUE(soon([&] { return stand.line.left_coasting(); }, 1000ms));
+  EXPECT_TRUE(stand.motor->stop().safe());
+}
+
+TEST(Motor, MayBeAskedAfterItWasClosed) {
+  Stand stand;
+  stand.spin(700);
+  stand.motor->close();
+  EXPECT_TRUE(stand.line.left_coasting());
+  stand.motor->emergency_stop();
+  stand.motor->close();
+  EXPECT_NE(stand.motor->failure(), "");
+  EXPECT_THROW(stand.motor->spin_at(RadPerSec(100)), DeviceError);
 }
 
 TEST(Motor, ObeysManyThreads) {

@@ -64,4 +64,15 @@ TEST(Published, IsReadWholeWhileItIsWritten) {
   writer.join();
 }
 
+TEST(Published, KeepsNoReaderWhoseWriterStandsStillInTheMidstOfIt) {
+  struct alignas(8) Word {
+    std::uint64_t word;
+  };
+  Published<Word> published;
+  published.publish({7});
+  EXPECT_EQ(published.read().word, 7u);
+  reinterpret_cast<std::atomic<std::uint32_t>&>(published) = 1;  // its version: odd, being written
+  EXPECT_EQ(published.read().word, 0u);
+}
+
 }  // namespace kphi::netbox::health_test
