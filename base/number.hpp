@@ -3,6 +3,7 @@
 #pragma once
 
 #include <charconv>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,6 +23,9 @@ void append_shortest(std::string& text, double value);
 
 /// "1.0081 ± 0.0073": the same without an exponent, for numbers near 1. Six digits where `half_width` is not positive.
 [[nodiscard]] std::string plain_with_error(double value, double half_width);
+
+/// "812 B", "23.41 MB", "1.204 GB": four digits, by powers of 1000.
+[[nodiscard]] std::string bytes_in_words(std::uint64_t bytes);
 
 /// The whole of `text` as a number (std::from_chars), NaN and infinities included; nullopt for anything else, such as
 /// "", " 1" and "+1".

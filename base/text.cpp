@@ -18,6 +18,7 @@ namespace kphi {
 namespace {
 
 constexpr std::size_t kBlock = std::size_t{1} << 20, kSmallBlock = std::size_t{1} << 12;
+constexpr const char* kTooLong = "has a line of more than 1 MiB; check that this is the right file";
 
 [[noreturn]] void fail(const char* what, const char* next_move) {
   throw std::runtime_error(fmt::format("{}: {}; {}", what, std::strerror(errno), next_move));
@@ -62,6 +63,7 @@ std::string_view TextFile::next_block() {
       return std::string_view(bytes_).substr(0, given_);
     }
     searched = bytes_.size();
+    if (searched > kLongestLine) throw std::runtime_error(kTooLong);
   }
   given_ = bytes_.size();
   return bytes_;
@@ -72,6 +74,18 @@ std::string read_text_file(const std::filesystem::path& path, std::size_t most_b
   std::string text;
   for (std::string_view block = file.next_block(); !block.empty(); block = file.next_block()) text += block;
   return text;
+}
+
+bool next_line(std::istream& in, std::string& line) {
+  line.clear();
+  for (std::streambuf& from = *in.rdbuf();;) {
+    const int c = from.sbumpc();
+    if (c == std::streambuf::traits_type::eof()) break;
+    if (c == '\n') return true;
+    line += static_cast<char>(c);
+    if (line.size() > kLongestLine) throw std::runtime_error(kTooLong);
+  }
+  return !line.empty();
 }
 
 std::string printable(std::string_view text, LineEnds line_ends) {
@@ -91,6 +105,12 @@ std::string printable(std::string_view text, LineEnds line_ends) {
     }
   }
   return out;
+}
+
+std::string in_quotes(std::string_view foreign) {
+  constexpr std::size_t kShown = 80;
+  const bool is_cut = foreign.size() > kShown;
+  return '"' + printable(foreign.substr(0, kShown)) + (is_cut ? "…\"" : "\"");
 }
 
 }  // namespace kphi

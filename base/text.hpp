@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <istream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,8 +14,15 @@
 
 namespace kphi {
 
+/// In bytes: what is longer is no text of lines.
+inline constexpr std::size_t kLongestLine = std::size_t{1} << 20;
+
+/// The next line of a stream, without its end; false at the end. Throws std::runtime_error ("cause; next move") beyond
+/// kLongestLine.
+[[nodiscard]] bool next_line(std::istream& in, std::string& line);
+
 /// The file's bytes, `most_bytes` at most. Throws std::runtime_error ("cause; next move", without the file's name) if
-/// the file cannot be opened or read, is longer, or is a folder, a pipe or a device.
+/// the file cannot be opened or read, is longer, has a line beyond kLongestLine, or is a folder, a pipe or a device.
 [[nodiscard]] std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes);
 
 /// A text in blocks of whole lines, one at hand at a time: the whole of it, or piece by piece where it is too long for
@@ -65,5 +73,8 @@ enum class LineEnds { replace, keep };
 /// Valid UTF-8 without control characters, fit for a terminal and for JSON: each byte or character that is neither
 /// becomes U+FFFD. What a device or a file says could otherwise clear the screen or rename its window.
 [[nodiscard]] std::string printable(std::string_view text, LineEnds line_ends = LineEnds::replace);
+
+/// A name or a value of somebody else, for a message: printable, in quotes, its first 80 bytes.
+[[nodiscard]] std::string in_quotes(std::string_view foreign);
 
 }  // namespace kphi

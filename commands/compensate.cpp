@@ -13,6 +13,7 @@
 
 #include "base/csv.hpp"
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 
@@ -64,9 +65,8 @@ std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const
   const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
   const auto like = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(stem); });
   if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, kNextMove);
-  return fmt::format(
-      "column `{}` is missing, but there is `{}`; convert it to the unit in the wanted name and rename it", wanted,
-      *like);
+  return fmt::format("column `{}` is missing, but there is {}; convert it to the unit in the wanted name and rename it",
+                     wanted, in_quotes(*like));
 }
 
 /// The places of the columns.
@@ -89,7 +89,7 @@ std::string read_row(const Fields& fields, std::size_t expected, const std::arra
   if (fields.size() != expected) return fmt::format("has {} fields where the header has {}", fields.size(), expected);
   for (std::size_t i = 0; i < kColumns; ++i) {
     const auto value = parse_finite(fields[places[i]]);
-    if (!value) return fmt::format("{} is `{}`, not a finite number", kColumnNames[i], fields[places[i]]);
+    if (!value) return fmt::format("{} is {}, not a finite number", kColumnNames[i], in_quotes(fields[places[i]]));
     values[i] = *value;
   }
   return {};
@@ -193,7 +193,15 @@ ExitCode compensate(const CompensateRequest& request) {
 RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
                           RowFormat format) {
   std::string line;
-  std::getline(in, line);
+  std::uint64_t line_number = 1;
+  const auto next = [&] {
+    try {
+      return next_line(in, line);
+    } catch (const std::runtime_error& error) {
+      throw ConfigurationError(fmt::format("stdin:{}: {}", line_number, error.what()));
+    }
+  };
+  (void)next();
   const Fields header = fields_of(line);
   const auto places = read_header(header);
 
@@ -202,7 +210,7 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
   std::array<double, kColumns> values{};
   std::array<Radians, 4> arm_angles;
   std::array<Newtons, 4> thrusts;
-  for (std::uint64_t line_number = 2; out && std::getline(in, line); ++line_number) {
+  while (out && (++line_number, next())) {
     const Fields fields = fields_of(line);
     if (is_blank(fields)) continue;
     const std::string complaint = read_row(fields, header.size(), places, values);

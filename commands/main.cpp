@@ -50,7 +50,10 @@ void print_message(const std::string& words) {
 }
 
 ExitCode complain(const std::exception& error, ExitCode exit_code) {
-  print_message(fmt::format("kphi: {}\n", kphi::printable(error.what(), kphi::LineEnds::keep)));
+  constexpr std::size_t kLongest = 8192;  // whatever a file holds
+  const std::string_view words = error.what();
+  print_message(fmt::format("kphi: {}{}\n", kphi::printable(words.substr(0, kLongest), kphi::LineEnds::keep),
+                            words.size() > kLongest ? "…" : ""));
   return exit_code;
 }
 

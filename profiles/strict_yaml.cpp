@@ -55,7 +55,7 @@ std::optional<BadCharacter> first_bad_character(const std::string& text) {
     const auto offset = static_cast<std::size_t>(begin - text.begin());
     if (c == utf::illegal || c == utf::incomplete) return BadCharacter{offset, "a byte sequence that is not UTF-8"};
     const bool is_line_end = c == '\n' || (c == '\r' && at != text.end() && *at == '\n');
-    if ((c < 0x20 && c != '\t' && !is_line_end) || c == 0x7F)
+    if ((c < 0x20 && c != '\t' && !is_line_end) || (c >= 0x7F && c < 0xA0))
       return BadCharacter{offset, fmt::format("a control character (0x{:02x})", c)};
   }
   return std::nullopt;

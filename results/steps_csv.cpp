@@ -14,6 +14,7 @@
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "base/ordered_work.hpp"
+#include "base/text.hpp"
 
 namespace kphi::results {
 namespace {
@@ -226,7 +227,7 @@ Columns columns_named(const std::vector<std::string>& names) {
   Columns columns;
   for (const std::string& name : names) {
     const auto found = std::ranges::find(kColumns, name, &StepColumn::name);
-    if (found == kColumns.end()) throw std::invalid_argument(fmt::format("unknown column \"{}\"", name));
+    if (found == kColumns.end()) throw std::invalid_argument(fmt::format("unknown column {}", in_quotes(name)));
     if (std::ranges::count(names, name) > 1) throw std::invalid_argument(fmt::format("column {} occurs twice", name));
     columns.push_back(*found);
   }
@@ -244,7 +245,7 @@ StepMean step_from(const std::vector<std::string>& fields, const Columns& column
     try {
       std::visit(Parse{step, fields[i]}, columns[i].field);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(fmt::format("{}: \"{}\" {}", columns[i].name, fields[i], error.what()));
+      throw std::invalid_argument(fmt::format("{}: {} {}", columns[i].name, in_quotes(fields[i]), error.what()));
     }
   }
   return step;
@@ -261,7 +262,8 @@ std::uint32_t quality_flags_from_names(std::string_view names) {
   while (!names.empty()) {
     const std::string_view word = names.substr(0, names.find('+'));
     const auto bit = std::ranges::find(kFlagTexts, word, &FlagText::name) - kFlagTexts.begin();
-    if (bit == std::ssize(kFlagTexts)) throw std::invalid_argument(fmt::format("unknown quality flag \"{}\"", word));
+    if (bit == std::ssize(kFlagTexts))
+      throw std::invalid_argument(fmt::format("unknown quality flag {}", in_quotes(word)));
     flags |= 1u << bit;
     names.remove_prefix(std::min(word.size() + 1, names.size()));
   }

@@ -10,6 +10,7 @@
 #include "base/error.hpp"
 #include "base/json.hpp"
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "compensation/units.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/thrust_fit.hpp"
@@ -27,8 +28,8 @@ bool part_of_number(char c) { return std::isdigit(static_cast<unsigned char>(c))
 double non_negative(const Table& table, const TableRow& row, std::size_t column) {
   const auto value = parse_number(row.fields[column]);
   if (value && *value >= 0) return *value;
-  throw ConfigurationError(fmt::format("{}:{}: {} is \"{}\"; expected a number, 0 or above", table.path, row.line,
-                                       table.header[column], row.fields[column]));
+  throw ConfigurationError(fmt::format("{}:{}: {} is {}; expected a number, 0 or above", table.path, row.line,
+                                       table.header[column], in_quotes(row.fields[column])));
 }
 
 std::string_view first_line(std::string_view text) { return text.substr(0, text.find('\n')); }

@@ -9,6 +9,7 @@
 
 #include "base/error.hpp"
 #include "base/ordered_work.hpp"
+#include "base/text.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
@@ -120,6 +121,14 @@ using Columns = std::vector<Column>;
   throw ConfigurationError(fmt::format("{}:{}: {}", table.path, std::max<std::size_t>(table.header_line, 1), what));
 }
 
+/// The first of these names, for a message.
+std::string list_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kShown = 40;
+  std::string list;
+  for (std::size_t i = 0; i < std::min(names.size(), kShown); ++i) list += (i == 0 ? "" : ", ") + in_quotes(names[i]);
+  return names.size() <= kShown ? list : list + fmt::format(" and {} more", names.size() - kShown);
+}
+
 const Column* find(const Columns& columns, Role role) {
   const auto found = std::ranges::find(columns, role, &Column::role);
   return found == columns.end() ? nullptr : &*found;
@@ -132,8 +141,8 @@ std::size_t column_named(const Table& table, const std::string& name) {
   for (std::size_t i = 0; found.empty() && i < table.header.size(); ++i)
     if (split_header(table.header[i]).name == name) found.push_back(i);
   if (found.size() == 1) return found.front();
-  refuse(table, fmt::format("{} column \"{}\"; the file has \"{}\"", found.empty() ? "no" : "more than one", name,
-                            fmt::join(table.header, "\", \"")));
+  refuse(table, fmt::format("{} column {}; the file has {}", found.empty() ? "no" : "more than one", in_quotes(name),
+                            list_of(table.header)));
 }
 
 Column map_column(const Table& table, const ColumnRole& wanted) {
@@ -146,15 +155,16 @@ Column map_column(const Table& table, const ColumnRole& wanted) {
   const auto factor = unit_factor(role.measure, column.unit);
   const std::string known = unit_list(role.measure);
   if (!factor && column.unit.empty()) {
-    refuse(table, fmt::format("no unit given for column \"{}\"; name it: --column {}={}:UNIT with UNIT one of {}",
-                              header, role.name, wanted.header, known));
+    refuse(table, fmt::format("no unit given for column {}; name it: --column {}={}:UNIT with UNIT one of {}",
+                              in_quotes(header), role.name, wanted.header, known));
   }
   if (!factor)
-    refuse(table, fmt::format("unknown unit \"{}\" of column \"{}\"; known are {}", column.unit, header, known));
+    refuse(table,
+           fmt::format("unknown unit {} of column {}; known are {}", in_quotes(column.unit), in_quotes(header), known));
   const auto header_factor = unit_factor(role.measure, by_header);
   if (header_factor && *header_factor != *factor) {
-    refuse(table, fmt::format("unit mismatch: column \"{}\" is in {} by its header and in {} by --column; correct one",
-                              header, by_header, column.unit));
+    refuse(table, fmt::format("unit mismatch: column {} is in {} by its header and in {} by --column; correct one",
+                              in_quotes(header), by_header, column.unit));
   }
   column.factor = *factor;
   return column;
@@ -169,13 +179,13 @@ void map_channel(const Table& table, const KnownChannel& channel, Columns& colum
     const std::string unit = header.unit.empty() ? channel.unit : header.unit;
     const auto factor = unit_factor(measure, unit);
     if (!factor) {
-      const auto what =
-          fmt::format("unknown unit \"{}\" of column \"{}\"; known are {}", unit, table.header[i], unit_list(measure));
+      const auto what = fmt::format("unknown unit {} of column {}; known are {}", in_quotes(unit),
+                                    in_quotes(table.header[i]), unit_list(measure));
       if (channel.required) refuse(table, what);
       unread.push_back(what);
     } else if (const Column* twice = find(columns, channel.role)) {
       refuse(table, table.header[twice->index] == table.header[i]
-                        ? fmt::format("more than one column \"{}\"", table.header[i])
+                        ? fmt::format("more than one column {}", in_quotes(table.header[i]))
                         : fmt::format("two {} columns with different units", channel.name));
     } else {
       columns.push_back({channel.role, i, *factor, unit});

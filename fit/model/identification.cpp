@@ -9,6 +9,7 @@
 #include <set>
 
 #include "base/error.hpp"
+#include "base/text.hpp"
 #include "compensation/units.hpp"
 #include "results/reduction/run_zero.hpp"
 
@@ -211,7 +212,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   require_one_propeller(steps);
   Identification result;
   result.options = options;
-  result.propeller = options.propeller.empty() ? steps.front().propeller : options.propeller;
+  result.propeller = options.propeller.empty() ? printable(steps.front().propeller) : options.propeller;
   result.diameter_in = options.diameter_in > 0 ? options.diameter_in : steps.front().diameter_in;
   result.blades = options.blades > 0 ? options.blades : steps.front().blades;
   require_runs(steps, options.left_out);

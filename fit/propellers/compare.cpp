@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/json.hpp"
+#include "base/text.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
@@ -67,7 +68,7 @@ ComparedResult result_of_steps(const std::string& file, const std::string& name)
   const ThrustFit fit = fit_thrust(points);
   ComparedResult result;
   result.name = name;
-  result.propeller = steps.front().propeller;
+  result.propeller = printable(steps.front().propeller);
   result.diameter_in = steps.front().diameter_in;
   result.speed_min_rad_s = fit.speed_min_rad_s;
   result.speed_max_rad_s = fit.speed_max_rad_s;

@@ -46,7 +46,7 @@ TEST_F(TextFile, IsHandedOutInBlocksOfWholeLines) {
   std::mt19937 random(1);
   std::string text;
   while (text.size() < 5u << 20) text += std::string(random() % 200, static_cast<char>('a' + random() % 26)) + '\n';
-  text.insert(2u << 20, std::string(3u << 20, 'x'));  // a line longer than a block
+  text.insert(2u << 20, std::string(kLongestLine - 200, 'x'));
   text += "the last line has no end";
   kphi::TextFile blocks(file(text), text.size());
   std::string joined;
@@ -58,6 +58,28 @@ TEST_F(TextFile, IsHandedOutInBlocksOfWholeLines) {
   EXPECT_TRUE(joined == text);
   EXPECT_GT(count, 3u);
   EXPECT_TRUE(blocks.next_block().empty());
+}
+
+TEST_F(TextFile, HoldsNoLineThatIsNoText) {
+  kphi::TextFile blocks(file("a,b\n" + std::string(3 * kLongestLine, '\0')), std::size_t{1} << 30);
+  const auto read_on = [&] {
+    while (!blocks.next_block().empty()) {
+    }
+  };
+  EXPECT_THAT(read_on, testing::ThrowsMessage<std::runtime_error>(HasSubstr("a line of more than 1 MiB")));
+}
+
+TEST(NextLine, GivesEachLineOnceAndTheLastWithoutItsEnd) {
+  std::istringstream in("a\n\nb");
+  std::string line;
+  std::vector<std::string> lines;
+  while (next_line(in, line)) lines.push_back(line);
+  EXPECT_THAT(lines, testing::ElementsAre("a", "", "b"));
+}
+
+TEST(InQuotes, ShowsOfAForeignNameWhatFitsALine) {
+  EXPECT_EQ(in_quotes("RPM\x1B[2J"), "\"RPM\uFFFD[2J\"");
+  EXPECT_LT(in_quotes(std::string(200'000'000, 'x')).size(), 100u);
 }
 
 TEST(Printable, LeavesTextInUtf8AsItIs) {

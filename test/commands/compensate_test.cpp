@@ -90,9 +90,9 @@ TEST(CompensateRows, LeavesOutBadRowsAndNamesThemByLine) {
   EXPECT_EQ(result.counts.written, 2u);
   EXPECT_EQ(result.counts.rejected, 6u);
   EXPECT_THAT(result.words, StartsWith("stdin:3: has 7 fields where the header has 8; row skipped\n"
-                                       "stdin:4: thrust2_n is `much`, not a finite number; row skipped\n"
-                                       "stdin:6: theta2_deg is `nan`"));
-  EXPECT_THAT(result.words, HasSubstr("stdin:9: thrust4_n is `1 N`"));
+                                       "stdin:4: thrust2_n is \"much\", not a finite number; row skipped\n"
+                                       "stdin:6: theta2_deg is \"nan\""));
+  EXPECT_THAT(result.words, HasSubstr("stdin:9: thrust4_n is \"1 N\""));
 }
 
 TEST(CompensateRows, RefusesAHeaderWithoutAllColumns) {
@@ -100,6 +100,23 @@ TEST(CompensateRows, RefusesAHeaderWithoutAllColumns) {
        {std::string(), std::string("1,2,3,4,5,6,7,8\n"), kHeader.substr(11), "theta1_deg," + kHeader}) {
     EXPECT_THROW(compensated(bad), ConfigurationError) << bad;
   }
+}
+
+/// Never ends a line.
+class OneByte : public std::streambuf {
+  int_type underflow() override {
+    setg(&byte_, &byte_, &byte_ + 1);
+    return traits_type::to_int_type(byte_);
+  }
+  char byte_ = '\0';
+};
+
+TEST(CompensateRows, RefusesAStreamThatNeverEndsALine) {
+  OneByte zeros;
+  std::istream in(&zeros);
+  std::ostringstream out, words;
+  Compensator compensator = example_compensator();
+  EXPECT_THROW((void)compensate_rows(in, out, words, compensator, RowFormat::csv), ConfigurationError);
 }
 
 TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
@@ -115,7 +132,7 @@ TEST(CompensateRows, SaysWhatIsWrongWithTheHeader) {
   EXPECT_THAT(complaint(""), StartsWith("stdin:1: no header; the first line must name theta1_deg..theta4_deg"));
   EXPECT_THAT(complaint(rest), StartsWith("stdin:1: column `theta1_deg` is missing; the first line must name"));
   EXPECT_THAT(complaint("theta1_rad," + rest),
-              StartsWith("stdin:1: column `theta1_deg` is missing, but there is `theta1_rad`; convert it"));
+              StartsWith("stdin:1: column `theta1_deg` is missing, but there is \"theta1_rad\"; convert it"));
   EXPECT_THAT(complaint("theta1_deg,thrust1_n," + rest), StartsWith("stdin:1: column `thrust1_n` appears 2 times"));
 }
 
