@@ -7,6 +7,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "compensation/file/plausibility.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
@@ -93,7 +94,10 @@ void export_run(const ExportRequest& request) {
   results::require_unchanged_run(request.file, results::digests_beside(request.file));
   const results::RunRecording run = results::read_run(request.file);
   std::ofstream file;
-  if (!request.out.empty()) file.open(request.out, std::ios::binary | std::ios::trunc);
+  if (!request.out.empty()) {
+    write_output(request.out, "", request.to == "csv" ? "time_s,force_x_n," : "\x89MCAP kphi.Phase");
+    file.open(request.out, std::ios::binary | std::ios::trunc);
+  }
   std::ostream& out = request.out.empty() ? std::cout : file;
   print_lost(request.to == "csv" ? run_to_csv(run, out) : run_to_mcap(run, out));
   out.flush();

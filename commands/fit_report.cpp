@@ -8,6 +8,7 @@
 #include "base/number.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "compensation/file/plausibility.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"

@@ -5,6 +5,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/flight/reproduction.hpp"
 #include "compensation/flight/tables.hpp"

@@ -8,6 +8,7 @@
 #include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "fit/logs/import_table.hpp"
 #include "results/digest.hpp"
 #include "results/file_layer.hpp"
@@ -87,6 +88,8 @@ ImportedLog import_file(const std::string& path, const ImportRequest& request, c
   const ImportedTable& table = import.table;
   const std::string name = fs::path(path).stem().string();
   const fs::path folder = fs::path(request.out) / name;
+  if (fs::exists(folder / "journal.jsonl") || fs::exists(folder / "runs"))
+    throw ConfigurationError(folder.string() + ": holds a campaign; choose another --out");
   fs::create_directories(folder);
   std::future<ThrustFit> fitting =
       std::async(launch_for(table.size() * sizeof(Point)), [&table] { return fit_thrust(points_of(table)); });

@@ -55,10 +55,7 @@ std::string take_runs(const results::CampaignFolder& folder, Provenance& provena
   const results::JournalReading journal = results::read_journal(folder.journal());
   require_unchanged(folder, journal);
   for (const results::JournalEntry& entry : journal.entries) {
-    const auto text = [&](const char* key) {
-      const bool is_text = entry.data.contains(key) && entry.data[key].is_string();
-      return is_text ? entry.data[key].get<std::string>() : std::string("unknown");
-    };
+    const auto text = [&](const char* key) { return entry.data.value(key, std::string("unknown")); };
     if (entry.event == results::kCampaignStarted) load_cell = text("load_cell");
     if (entry.event == results::kRunAborted) provenance.rejected.push_back({text("run"), entry.utc, text("reason")});
     if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
@@ -256,16 +253,6 @@ void add_live_options(CLI::App& command, daq::live::LiveOptions& options) {
 std::string live_greeting(const daq::live::LiveSession& view) {
   const std::string url = view.url();
   return url.empty() ? url : fmt::format("live: {}\n", url);
-}
-
-void write_output(const fs::path& path, const std::string& text) {
-  std::error_code none;
-  if (const fs::path folder = path.parent_path(); !folder.empty() && !fs::is_directory(folder, none))
-    throw ConfigurationError(
-        fmt::format("{}: the folder {} does not exist; create it, or choose another", path.string(), folder.string()));
-  if (fs::is_directory(path, none)) throw ConfigurationError(path.string() + ": is a folder; name a file in it");
-  results::MemoryOnlySync files;
-  results::write_text(path, text, files);
 }
 
 }  // namespace kphi::commands

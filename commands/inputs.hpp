@@ -69,7 +69,4 @@ void add_live_options(CLI::App& command, daq::live::LiveOptions& options);
 /// "live: http://…" as a line; empty without one.
 [[nodiscard]] std::string live_greeting(const daq::live::LiveSession& view);
 
-/// Writes a file that can be made again at any time: without waiting for the disk.
-void write_output(const std::filesystem::path& path, const std::string& text);
-
 }  // namespace kphi::commands

@@ -21,6 +21,11 @@ struct ListRequest {
 std::optional<CampaignSummary> campaign_in(const fs::path& folder) {
   try {
     return summary_of(results::CampaignFolder::open(folder));
+  } catch (const DataRejected& error) {
+    CampaignSummary summary;
+    summary.folder = folder.string();
+    summary.damage = error.what();
+    return summary;
   } catch (const RecordError&) {
     return std::nullopt;
   }

@@ -37,6 +37,7 @@ struct PackedFile {
 constexpr const char* kMetadata = "ro-crate-metadata.json";
 constexpr const char* kChecksums = "checksums.sha256";
 constexpr const char* kReadme = "README.md";
+constexpr const char* kRuns = "runs";
 
 std::string media_type(const fs::path& file) {
   const std::string end = file.extension().string();
@@ -51,14 +52,33 @@ std::string media_type(const fs::path& file) {
   return "text/plain";
 }
 
-/// Every file but the lock, by name.
+void require_text(const std::string& name) {
+  if (printable(name) == name) return;
+  throw DataRejected(printable(name) +
+                     ": a name that is no UTF-8 text; rename it: other computers could not unpack it");
+}
+
+/// Adds every file but the lock. A link could lead out of the folder; what it stands for belongs in its place.
+void add_files(const fs::path& folder, const std::string& prefix, std::vector<PackedFile>& files) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = prefix + entry.path().lexically_relative(folder).generic_string();
+    if (entry.path().filename() == ".lock") continue;
+    require_text(name);
+    const fs::file_type type = entry.symlink_status().type();
+    if (type == fs::file_type::directory || (type == fs::file_type::symlink && name == kRuns && entry.is_directory()))
+      continue;
+    if (type != fs::file_type::regular)
+      throw DataRejected(entry.path().string() +
+                         ": is a link, a pipe or a device; put the file itself into its place, or remove it");
+    files.push_back({name, entry.file_size(), results::sha256_of_file(entry.path())});
+  }
+}
+
+/// By name. The runs may lie on another disk.
 std::vector<PackedFile> files_of(const fs::path& folder) {
   std::vector<PackedFile> files;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_regular_file() || entry.path().filename() == ".lock") continue;
-    files.push_back({fs::relative(entry.path(), folder).generic_string(), entry.file_size(),
-                     results::sha256_of_file(entry.path())});
-  }
+  add_files(folder, "", files);
+  if (fs::is_symlink(folder / kRuns)) add_files(folder / kRuns / "", kRuns + std::string("/"), files);
   std::ranges::sort(files, {}, &PackedFile::name);
   return files;
 }
@@ -165,6 +185,16 @@ class Zip {
     if (zip_close(zip_.get()) != 0) fail("write");
     (void)zip_.release();
   }
+  /// What a written one holds. Throws RecordError.
+  [[nodiscard]] static std::vector<std::string> names_in(const std::string& path) {
+    int code = 0;
+    const std::unique_ptr<zip_t, Discard> zip(zip_open(path.c_str(), ZIP_RDONLY, &code));
+    if (!zip) throw RecordError(path + ": cannot be read again");
+    std::vector<std::string> names;
+    for (zip_int64_t i = 0; i < zip_get_num_entries(zip.get(), 0); ++i)
+      names.emplace_back(zip_get_name(zip.get(), static_cast<zip_uint64_t>(i), 0));
+    return names;
+  }
 
  private:
   void add(zip_source_t* source, const std::string& name, bool compressed) {
@@ -199,6 +229,7 @@ ExitCode pack(const PackRequest& asked) {
   if (request.creator.empty()) request.creator = summary.operator_name;
   const std::string root = fs::absolute(folder.path() / ".").lexically_normal().parent_path().filename().string();
   if (request.out.empty()) request.out = root + ".zip";
+  require_text(root);
 
   const std::vector<PackedFile> files = files_of(folder.path());
   std::string checksums;
@@ -212,15 +243,18 @@ ExitCode pack(const PackRequest& asked) {
   zip.add_text(readme, root + "/" + kReadme);
   zip.close();
 
+  const std::vector<std::string> packed = Zip::names_in(request.out);
+  const auto runs = static_cast<std::size_t>(std::ranges::count_if(packed, [&](const std::string& name) {
+    return name.starts_with(root + "/runs/") && results::is_complete_run(fs::path(name).filename().string());
+  }));
+  if (runs != verified.runs)
+    throw RecordError(fmt::format("{}: holds {} runs, {} were verified; pack again", request.out, runs, verified.runs));
   if (asked.json) {
-    print_json({{"zip", request.out},
-                {"files", files.size() + 3},
-                {"runs", verified.runs},
-                {"bytes", fs::file_size(request.out)}});
+    print_json({{"zip", request.out}, {"files", packed.size()}, {"runs", runs}, {"bytes", fs::file_size(request.out)}});
     return ExitCode::ok;
   }
   fmt::print("{}\n", request.out);
-  fmt::print(stderr, "packed        {} runs, verified; {} files, {:.1f} MB\n", verified.runs, files.size() + 3,
+  fmt::print(stderr, "packed        {} runs, verified; {} files, {:.1f} MB\n", runs, packed.size(),
              1e-6 * static_cast<double>(fs::file_size(request.out)));
   if (request.licence.empty())
     fmt::print(stderr, "licence       none stated; archives ask for one: --license CC-BY-4.0\n");

@@ -4,6 +4,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "daq/campaign/dry_run.hpp"
 #include "fit/plan/choices.hpp"
 #include "fit/propellers/history.hpp"
@@ -99,7 +100,8 @@ void add_plan(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--minutes-per-mounting", "MIN", request.minutes_per_mounting,
             "of a person at the stand (default: 2)")
       ->check(CLI::NonNegativeNumber.description(""));
-  add_value(command, "--out", "FILE", request.out, "write the chosen campaign: the file with its values replaced");
+  add_value(command, "--out", "FILE", request.out,
+            "write the chosen campaign to a new file: this one with its values replaced");
   add_value(command, "--choose", "N", request.choose, "which of the choices (default: 1, the cheapest)")
       ->check(CLI::PositiveNumber.description(""));
   command.add_flag("--json", request.json, "print everything as JSON");

@@ -38,10 +38,18 @@ std::optional<RunName> parse_run_name(const std::string& name) {
   const std::size_t place = std::min(name.find("_rep", phi), name.find("_ref", phi));
   if (!name.ends_with(".h5") || phi == std::string::npos || place == std::string::npos) return std::nullopt;
   const auto angle = parse_double(name.substr(phi + 4, place - phi - 4));
-  const auto number = parse_double(name.substr(place + 4, name.size() - 3 - place - 4));
+  const auto number = parse_integer<int>(name.substr(place + 4, name.size() - 3 - place - 4));
   if (!angle || !number) return std::nullopt;
   const int sign = name[place + 3] == 'f' ? -1 : 1;
-  return RunName{*angle, sign * static_cast<int>(*number), name.substr(0, phi)};
+  return RunName{*angle, sign * *number, name.substr(0, phi)};
+}
+
+constexpr const char* kNoFile = ": is a link, a folder, a pipe or a device; put the file itself into its place";
+
+/// A link may lead to anything, a pipe may never end.
+bool is_file_or_nothing(const std::filesystem::path& path) {
+  const auto there = std::filesystem::symlink_status(path);
+  return !std::filesystem::exists(there) || std::filesystem::is_regular_file(there);
 }
 
 std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
@@ -61,6 +69,7 @@ std::vector<std::filesystem::path> complete_files(const std::filesystem::path& f
     const auto name = parse_run_name(file.filename().string());
     if (!name || (name->repetition < 0) != references) continue;
     const auto place = std::ranges::find(occlusions_deg, name->occlusion_deg) - occlusions_deg.begin();
+    if (!is_file_or_nothing(file)) throw DataRejected(file.string() + kNoFile);
     found.emplace(Key{place, name->occlusion_deg, std::abs(name->repetition), name->propeller}, file);
   }
   std::vector<std::filesystem::path> paths;
@@ -86,11 +95,8 @@ std::string set_aside(const CampaignFolder& folder, const std::filesystem::path&
 /// Run (relative to the folder) → SHA-256, as last written down.
 std::map<std::string, std::string> digests_of_runs(const JournalReading& journal) {
   std::map<std::string, std::string> digests;
-  for (const JournalEntry& entry : journal.entries) {
-    const auto& data = entry.data;
-    if (!data.contains("file") || !data.contains("sha256")) continue;
-    if (data["file"].is_string() && data["sha256"].is_string()) digests[data["file"]] = data["sha256"];
-  }
+  for (const auto& [n, time_ns, utc, event, data] : journal.entries)
+    if (data.contains("file") && data.contains("sha256")) digests[data["file"]] = data["sha256"];
   return digests;
 }
 
@@ -110,11 +116,10 @@ std::map<std::string, std::string> digests_of_copies(const CampaignFolder& folde
 
 /// Adds a problem unless the file is the one of the journal.
 void check_file(const std::filesystem::path& path, const std::string& sha256, std::vector<std::string>& problems) {
-  const auto there = std::filesystem::symlink_status(path);
-  if (!std::filesystem::exists(there)) {
+  if (!is_file_or_nothing(path)) {
+    problems.push_back(path.string() + kNoFile);
+  } else if (!std::filesystem::exists(path)) {
     problems.push_back(path.string() + ": missing, but in the journal");
-  } else if (!std::filesystem::is_regular_file(there)) {
-    problems.push_back(path.string() + ": a link, a folder, a pipe or a device, not a file");
   } else if (sha256_of_file(path) != sha256) {
     problems.push_back(path.string() + ": SHA-256 does not match the journal");
   }
@@ -123,13 +128,7 @@ void check_file(const std::filesystem::path& path, const std::string& sha256, st
 /// Adds a problem unless the folder holds them as given.
 void check_files(const CampaignFolder& folder, const std::map<std::string, std::string>& digests,
                  std::vector<std::string>& problems) {
-  for (const auto& [file, digest] : digests) {
-    if (lies_inside(file))
-      check_file(folder.path() / file, digest, problems);
-    else
-      problems.push_back(
-          fmt::format("{}: the journal names a file outside the folder: {}", folder.path().string(), printable(file)));
-  }
+  for (const auto& [file, digest] : digests) check_file(folder.path() / file, digest, problems);
 }
 
 DataRejected changed_run(const std::string& problem) {
@@ -154,6 +153,8 @@ std::string run_file_name(const std::string& propeller_id, double occlusion_deg,
                      std::abs(repetition));
 }
 
+bool is_complete_run(const std::string& name) { return parse_run_name(name).has_value(); }
+
 CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const std::string& utc,
                                       const std::string& name, FileLayer& files) {
   const std::string base = (parent / file_name_safe(utc + "_" + name)).string();
@@ -172,6 +173,10 @@ CampaignFolder CampaignFolder::create(const std::filesystem::path& parent, const
 
 CampaignFolder CampaignFolder::open(const std::filesystem::path& path) {
   CampaignFolder folder(path.has_filename() ? path : path.parent_path());
+  for (const auto& file :
+       {folder.journal(), folder.campaign_file(), folder.bench_file(), folder.faults_file(), folder.motor_file(),
+        folder.steps(), folder.means(), folder.references(), folder.coefficients(), folder.report(), path / kSumsFile})
+    if (!is_file_or_nothing(file)) throw DataRejected(file.string() + kNoFile);
   if (std::filesystem::exists(folder.journal()) || std::filesystem::is_directory(folder.runs())) return folder;
   throw RecordError(path.string() +
                     ": not a campaign folder: no journal.jsonl and no runs/ in it; name a folder made by kphi run");
@@ -285,8 +290,7 @@ FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& jou
     if (entry.event == kRunAccepted) old = true;
     if (entry.event != kTablesWritten || !entry.data.contains("files")) continue;
     old = false;
-    for (const auto& [file, digest] : entry.data["files"].items())
-      if (digest.is_string()) tables[file] = digest;
+    for (const auto& [file, digest] : entry.data["files"].items()) tables[file] = digest;
   }
   if (!old) check_files(folder, tables, found.problems);
   if (old)
@@ -312,7 +316,10 @@ CampaignVerification verify_campaign(const CampaignFolder& folder) {
   }
   check_files(folder, digests, found.problems);
   try {
-    for (std::string& problem : unlike_sums(folder.path())) found.problems.push_back(std::move(problem));
+    std::vector<std::filesystem::path> made{folder.coefficients(), folder.report()};
+    for (const auto& figure : files_in(folder.figures()))
+      if (figure.extension() == ".svg") made.push_back(figure);
+    for (std::string& problem : unlike_sums(folder.path(), made)) found.problems.push_back(std::move(problem));
   } catch (const DataRejected& error) {
     found.problems.emplace_back(error.what());
   }

@@ -21,6 +21,9 @@ namespace kphi::results {
 /// "5x3_phi000_ref1.h5".
 [[nodiscard]] std::string run_file_name(const std::string& propeller_id, double occlusion_deg, int repetition);
 
+/// By its name alone.
+[[nodiscard]] bool is_complete_run(const std::string& name);
+
 class CampaignFolder {
  public:
   /// Creates `<parent>/<utc>_<name>` with runs/ and figures/; if the name is taken, `…-2`, `…-3`. `utc` as the caller
@@ -28,7 +31,8 @@ class CampaignFolder {
   /// RecordError.
   [[nodiscard]] static CampaignFolder create(const std::filesystem::path& parent, const std::string& utc,
                                              const std::string& name, FileLayer& files = disk());
-  /// An existing folder. Throws RecordError if it has neither a journal nor runs.
+  /// An existing folder; its runs/ may be a link, to another disk. Throws RecordError if it has neither a journal nor
+  /// runs, DataRejected for a link, a pipe or a device in the place of one of its files.
   [[nodiscard]] static CampaignFolder open(const std::filesystem::path& folder);
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
@@ -53,7 +57,7 @@ class CampaignFolder {
   }
 
   /// Complete runs: by place of their occlusion in `occlusions_deg` (unlisted ones behind, ascending), then repetition.
-  /// Uses the names only; opens no file.
+  /// Uses the names only; opens no file. Throws DataRejected for a link, a pipe or a device.
   [[nodiscard]] std::vector<std::filesystem::path> complete_runs(std::span<const double> occlusions_deg = {}) const;
   /// Complete reference runs, in their order.
   [[nodiscard]] std::vector<std::filesystem::path> reference_runs() const;

@@ -66,9 +66,14 @@ void record_sums(const std::filesystem::path& folder, std::span<const std::files
   write_text(folder / kSumsFile, text);
 }
 
-std::vector<std::string> unlike_sums(const std::filesystem::path& folder) {
+std::vector<std::string> unlike_sums(const std::filesystem::path& folder, std::span<const std::filesystem::path> made) {
   std::vector<std::string> problems;
-  for (const auto& [file, digest] : read_sums(folder)) {
+  const std::map<std::string, std::string> sums = read_sums(folder);
+  for (const auto& file : made)
+    if (std::filesystem::exists(file) && !sums.contains(file.lexically_proximate(folder).generic_string()))
+      problems.push_back(fmt::format("{}: has no line in {}, which kphi gives each file of a fit; fit again",
+                                     file.string(), kSumsFile));
+  for (const auto& [file, digest] : sums) {
     const std::filesystem::path path = folder / file;
     if (!lies_inside(file)) {
       problems.push_back(fmt::format("{}: {} names a file outside the folder", path.string(), kSumsFile));

@@ -25,7 +25,9 @@ inline constexpr const char* kSumsFile = "SHA256SUMS";
 [[nodiscard]] std::map<std::string, std::string> read_sums(const std::filesystem::path& folder);
 /// Enters these files, which lie in the folder, and keeps the other entries.
 void record_sums(const std::filesystem::path& folder, std::span<const std::filesystem::path> written);
-/// One line for each file of the list that is missing or changed.
-[[nodiscard]] std::vector<std::string> unlike_sums(const std::filesystem::path& folder);
+/// One line for each file of the list that is missing or changed, and for each of `made`, which kphi enters when it
+/// writes them, that is there without a line.
+[[nodiscard]] std::vector<std::string> unlike_sums(const std::filesystem::path& folder,
+                                                   std::span<const std::filesystem::path> made = {});
 
 }  // namespace kphi::results

@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "base/error.hpp"
+#include "base/text.hpp"
+#include "results/checksums.hpp"
 #include "results/digest.hpp"
 
 namespace kphi::results {
@@ -21,6 +23,26 @@ constexpr std::size_t kCheckDigits = 16;
 /// `body` is the line's object without its closing brace and without the checksum.
 std::string check_of(const std::string& previous, std::string_view body) {
   return sha256(previous + std::string(body)).substr(0, kCheckDigits);
+}
+
+/// Whether the known keys of an entry's data hold what their readers expect, and name files of the folder alone.
+std::optional<std::string> problem_of(const nlohmann::json& data) {
+  if (!data.is_object()) return "has data that are no object";
+  const auto is_of_folder = [](const std::string& file) -> std::optional<std::string> {
+    if (lies_inside(file)) return std::nullopt;
+    return fmt::format("names a file outside the folder: {}", printable(file));
+  };
+  for (const char* key : {"file", "sha256", "contents_xxh128", "run", "reason", "load_cell", "motor", "supply"})
+    if (data.contains(key) && !data[key].is_string()) return fmt::format("has a {} that is no text", key);
+  if (data.contains("file"))
+    if (auto problem = is_of_folder(data["file"])) return problem;
+  if (!data.contains("files")) return std::nullopt;
+  if (!data["files"].is_object()) return "has files that are no object";
+  for (const auto& [file, digest] : data["files"].items()) {
+    if (!digest.is_string()) return fmt::format("has a digest of {} that is no text", printable(file));
+    if (auto problem = is_of_folder(file)) return problem;
+  }
+  return std::nullopt;
 }
 
 /// Fills `entry`; the problem if the line is not an entry.
@@ -38,7 +60,7 @@ std::optional<std::string> parse_line(std::string_view line, std::uint64_t n, st
   } catch (const nlohmann::json::exception& error) {
     return error.what();
   }
-  if (!entry.data.is_object()) return "has data that are no object";
+  if (auto problem = problem_of(entry.data)) return problem;
   if (entry.n != n) return fmt::format("has number {} where {} was expected", entry.n, n);
   check = stored;
   return std::nullopt;

@@ -6,6 +6,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "commands/shell/templates.hpp"
 
 namespace kphi::commands {

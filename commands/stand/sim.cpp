@@ -9,6 +9,7 @@
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "commands/outputs.hpp"
 #include "daq/virtual/deterministic_bench.hpp"
 #include "drivers/sim/bench_server.hpp"
 #include "drivers/sim/control_line.hpp"
@@ -126,7 +127,7 @@ std::string resolved_text(const profiles::BenchConfig& bench, const Addresses& a
   const std::string &faults = bench.simulation->faults, &motor = bench.simulation->motor;
   if (!faults.empty()) file["simulation"]["faults"] = std::filesystem::absolute(faults).string();
   if (!motor.empty()) file["simulation"]["motor"] = std::filesystem::absolute(motor).string();
-  return YAML::Dump(file) + "\n";
+  return fmt::format("# written by kphi sim from {}\n{}\n", bench.path, YAML::Dump(file));
 }
 
 std::string ready_line(const profiles::BenchConfig& bench, const Addresses& addresses) {
@@ -152,7 +153,7 @@ ExitCode serve(const profiles::BenchConfig& bench, const SimRequest& options) {
   const ServerSettings settings = settings_of(bench, options);
   Server server(settings);
   if (!options.truth_log.empty())
-    write_output(options.truth_log, "");  // refuses an unwritable file now, not at the end
+    write_output(options.truth_log, "", json_lines(server.motor_truth()));  // refuses its name now, not at the end
   if (!options.truth.empty())
     write_output(options.truth, truth_yaml(bench.simulation->seed, settings.bench.plant.stand));
   if (!options.resolved.empty()) write_output(options.resolved, resolved_text(bench, server.addresses()));

@@ -1,6 +1,7 @@
 // What may be asked of campaigns that lie in a folder: list, info, pack.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <zip.h>
 
 #include <filesystem>
@@ -179,6 +180,128 @@ TEST_F(Campaigns, AreReadFromThePackageByTheLinesOfItsReadme) {
     ++lines;
   }
   EXPECT_EQ(lines, 3);
+}
+
+/// A copy that may be changed.
+class CampaignOfSomebody : public Campaigns {
+ protected:
+  CampaignOfSomebody() {
+    fs::copy(campaign_, folder_, fs::copy_options::recursive);
+    std::ofstream(secret_) << "secret\n";
+  }
+  [[nodiscard]] Answer pack() const { return say({"pack", folder_.string(), "--out", zip_.string()}); }
+  TemporaryFolder parent_folder_;
+  const fs::path folder_ = parent_folder_ / "c", secret_ = parent_folder_ / "secret", zip_ = parent_folder_ / "c.zip";
+};
+
+TEST_F(CampaignOfSomebody, HoldsNoLinkPipeOrFolderInPlaceOfAFile) {
+  const std::string campaign = (*parent_ / "campaign.yaml").string(), bench = (*parent_ / "bench.yaml").string();
+  const std::vector<std::vector<std::string>> verbs{{"info", "c"},
+                                                    {"verify", "c"},
+                                                    {"replay", "c"},
+                                                    {"fit", "c"},
+                                                    {"report", "c"},
+                                                    {"pack", "c", "--out", zip_.string()},
+                                                    {"list", "."},
+                                                    {"run", "--resume", "c", "--bench", bench, "--yes"},
+                                                    {"plan", campaign, "--pilot", "c"}};
+  for (const char* name : {"steps.csv", "means.csv", "campaign.yaml", "bench.yaml", "journal.jsonl",
+                           "coefficients.yaml", "report.html", "SHA256SUMS", "runs/5x3_phi090_rep1.h5"})
+    for (const char* other : {"pipe", "/dev/zero", "secret"}) {
+      const fs::path place = folder_ / name, kept = parent_folder_ / "kept";
+      fs::rename(place, kept);
+      if (other == std::string("pipe"))
+        ASSERT_EQ(::mkfifo(place.c_str(), 0600), 0);
+      else
+        fs::create_symlink(other == std::string("secret") ? secret_ : fs::path(other), place);
+      for (std::vector<std::string> words : verbs) {
+        words.insert(words.begin(), {"bash", "-c", "cd \"$0\" && ulimit -v 2000000 && exec timeout 10 \"$@\"",
+                                     parent_folder_.path().string(), test::kphi()});
+        Process asked(words);
+        EXPECT_LT(asked.wait(), 6) << words[5] << " " << place << "\n" << asked.err();
+        EXPECT_EQ((asked.out() + asked.err()).find("secret\n"), std::string::npos) << words[5] << " " << place;
+      }
+      const Answer verify = say({"verify", folder_.string()});
+      EXPECT_EQ(verify.code, 5) << place << verify.err;
+      EXPECT_THAT(verify.err, HasSubstr(fs::path(name).filename().string() + ": is a link, a folder, a pipe")) << place;
+      fs::remove(place);
+      fs::rename(kept, place);
+    }
+  EXPECT_EQ(say({"verify", folder_.string()}).code, 0);
+}
+
+TEST_F(CampaignOfSomebody, HasALineOfChecksumForEachFileOfItsFit) {
+  const fs::path list = folder_ / "SHA256SUMS";
+  const std::string whole = results::read_text(list);
+  for (const char* file : {"coefficients.yaml", "report.html"}) {
+    const std::size_t name = whole.find(std::string("  ") + file + "\n"), begin = whole.rfind('\n', name) + 1;
+    std::ofstream(list) << whole.substr(0, begin) + whole.substr(whole.find('\n', name) + 1);
+    const Answer verify = say({"verify", folder_.string()});
+    EXPECT_EQ(verify.code, 5);
+    EXPECT_THAT(verify.out, HasSubstr(std::string(file) + ": has no line in SHA256SUMS"));
+  }
+  fs::remove(list);
+  EXPECT_THAT(say({"verify", folder_.string()}).out, HasSubstr("coefficients.yaml: has no line in SHA256SUMS"));
+}
+
+TEST_F(CampaignOfSomebody, IsPackedWithoutWhatItsLinksStandFor) {
+  fs::create_symlink(secret_, folder_ / "notes.txt");
+  const Answer pack = this->pack();
+  EXPECT_EQ(pack.code, 5);
+  EXPECT_THAT(pack.err, HasSubstr("notes.txt: is a link"));
+  EXPECT_FALSE(fs::exists(zip_));
+}
+
+TEST_F(CampaignOfSomebody, IsPackedWithItsRunsOnAnotherDisk) {
+  fs::rename(folder_ / "runs", parent_folder_ / "disk");
+  fs::create_directory_symlink(parent_folder_ / "disk", folder_ / "runs");
+  const Answer pack = this->pack();
+  ASSERT_EQ(pack.code, 0) << pack.err;
+  EXPECT_THAT(pack.err, HasSubstr("packed        5 runs, verified"));
+  EXPECT_EQ(contents_of(zip_).count("c/runs/5x3_phi090_rep1.h5"), 1u);
+  EXPECT_EQ(contents_of(zip_).count("c/runs"), 0u);
+}
+
+TEST_F(CampaignOfSomebody, IsNotPackedWithNamesThatAreNoText) {
+  std::ofstream(folder_ / "notes_\xFF.txt") << "x";
+  const Answer pack = this->pack();
+  EXPECT_EQ(pack.code, 5);
+  EXPECT_THAT(pack.err, HasSubstr("notes_\uFFFD.txt: a name that is no UTF-8 text"));
+}
+
+TEST_F(CampaignOfSomebody, IsNeverReplacedByOut) {
+  const std::string run = (folder_ / "runs/5x3_phi090_rep1.h5").string();
+  fs::permissions(run, fs::perms::owner_write, fs::perm_options::add);
+  const std::string coefficients = (folder_ / "coefficients.yaml").string();
+  const std::vector<std::vector<std::string>> verbs{
+      {"export", coefficients, "--to", "agilicious", "--out"},
+      {"export", coefficients, "--to", "px4", "--speed-max-rpm", "19000", "--out"},
+      {"export", run, "--to", "csv", "--out"},
+      {"export", run, "--to", "mcap", "--out"},
+      {"fit", folder_.string(), "--no-report", "--out"},
+      {"report", folder_.string(), "--out"},
+      {"plan", (*parent_ / "campaign.yaml").string(), "--stand", "noise-n=0.001", "--stand", "runs=0.001", "--stand",
+       "k-t=1.55e-6", "--stand", "intercept=1.03", "--stand", "slope-per-deg=-0.0029", "--want", "slope 1 %", "--out"}};
+  for (const std::vector<std::string>& verb : verbs) {
+    for (const char* name : {"campaign.yaml", "journal.jsonl", "steps.csv", "runs/5x3_phi090_rep1.h5"}) {
+      std::vector<std::string> words = verb;
+      words.push_back((folder_ / name).string());
+      const std::string before = results::read_text(words.back(), 1 << 30);
+      const Answer answer = say(words);
+      EXPECT_EQ(answer.code, 2) << answer.err;
+      EXPECT_THAT(answer.err, HasSubstr("choose another name"));
+      EXPECT_TRUE(results::read_text(words.back(), 1 << 30) == before) << verb[0] << " over " << name;
+    }
+    std::vector<std::string> words = verb;
+    words.push_back((parent_folder_ / "own").string());
+    EXPECT_EQ(say(words).code, 0) << verb[0] << " " << verb[3];
+    const Answer again = say(words);
+    EXPECT_EQ(again.code, verb[0] == "plan" ? 2 : 0) << verb[0] << " " << verb[3] << again.err;
+    words.back() = "/dev/null";
+    EXPECT_EQ(say(words).code, 2) << "and it is there afterwards";
+    EXPECT_TRUE(fs::is_character_file("/dev/null"));
+    fs::remove(parent_folder_ / "own");
+  }
 }
 
 TEST_F(Campaigns, AreNotPackedWithDamage) {

@@ -48,6 +48,26 @@ TEST_F(JournalFile, TellsWhatWasToldInOrder) {
   }
 }
 
+TEST_F(JournalFile, HoldsUnderEachKeyWhatItsReadersExpect) {
+  const auto problem = [](const std::string& data) {
+    const std::string line =
+        chained_line("", R"({"n":1,"t_ns":0,"utc":"2021-05-30T00:00:00Z","event":"run_accepted","data":)" + data);
+    const JournalReading reading = parse_journal(line, "journal.jsonl");
+    EXPECT_EQ(reading.entries.empty(), !reading.problems.empty()) << data;
+    return reading.problems.empty() ? "" : reading.problems.front();
+  };
+  EXPECT_EQ(problem(R"({"file":"runs/a.h5","sha256":"00","steps_not_needed":2})"), "");
+  EXPECT_EQ(problem(R"({"file":5})"), "journal.jsonl:1: has a file that is no text");
+  EXPECT_EQ(problem(R"({"file":"/dev/zero"})"), "journal.jsonl:1: names a file outside the folder: /dev/zero");
+  EXPECT_EQ(problem(R"({"files":{"../../etc/passwd":"00"}})"),
+            "journal.jsonl:1: names a file outside the folder: ../../etc/passwd");
+  for (const char* value : {"5", "null", "[]", "{}", "true", "1e300"}) {
+    for (const char* key : {"file", "sha256", "contents_xxh128", "run", "reason", "load_cell", "motor", "supply"})
+      EXPECT_NE(problem(std::string("{\"") + key + "\":" + value + "}"), "") << key << value;
+    EXPECT_EQ(problem(std::string(R"({"files":)") + value + "}") == "", value == std::string("{}")) << value;
+  }
+}
+
 TEST_F(JournalFile, ATornLastLineIsToldAndCutOff) {
   write(3);
   const std::string whole = text();

@@ -5,6 +5,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <utility>
 
 #include "base/error.hpp"
@@ -31,10 +33,21 @@ void write_all(int fd, std::span<const std::uint8_t> bytes) noexcept {
   }
 }
 
+/// What is not a capture is not replaced by one.
+bool is_capture_or_nothing(const std::string& path) {
+  std::error_code none;
+  if (!std::filesystem::exists(path, none) || std::filesystem::file_size(path, none) == 0) return true;
+  std::string title(sizeof kTitle - 1, '\0');
+  std::ifstream(path, std::ios::binary).read(title.data(), static_cast<std::streamsize>(title.size()));
+  return title == kTitle;
+}
+
 }  // namespace
 
-Capture::Capture(const std::string& path)
-    : file_(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+Capture::Capture(const std::string& path) {
+  if (!is_capture_or_nothing(path))
+    throw DeviceError("capture " + path, "create", "exists, and is no capture", "choose another file");
+  file_ = Descriptor(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (file_.number() < 0) throw DeviceError("capture " + path, "create", std::strerror(errno), "choose another file");
   waiting_.assign(kTitle, kTitle + sizeof kTitle - 1);
   writer_ = start_thread({"motor capture"}, [this] { run(); });

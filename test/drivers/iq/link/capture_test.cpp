@@ -85,6 +85,15 @@ TEST_F(CaptureOnDisk, KeepsBytesTimesAndDirections) {
   EXPECT_EQ(records[2].time, Instant(1h));
 }
 
+TEST_F(CaptureOnDisk, ReplacesACaptureAndNoOtherFile) {
+  for (int i = 0; i < 2; ++i) Capture(path).add(Direction::sent, fake::Bytes{1}, 5ns);
+  EXPECT_EQ(read_capture(path).size(), 1u);
+  const std::string other = folder / "bench.yaml";
+  std::ofstream(other) << "format: kphi-bench/1\n";
+  EXPECT_THROW(Capture{other}, DeviceError);
+  EXPECT_EQ(std::filesystem::file_size(other), 21u);
+}
+
 TEST(Capture, RefusesAFolderThatIsNotThere) { EXPECT_THROW(Capture("/no/such/folder/line.iqc"), DeviceError); }
 
 TEST_F(CaptureOnDisk, MarksWhatItCouldNotTake) {
