@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/text.hpp"
 #include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
@@ -47,11 +48,7 @@ Plan plan_of(const Campaign& campaign) { return make_plan(campaign, BenchConfig{
 
 std::string lines_of(const Campaign& campaign) {
   std::string doubts;
-  if (const auto radians = compensation::doubt_of_angles(campaign.occlusions_deg))
-    doubts += "  doubtful   " + *radians + "\n";
-  if (std::ranges::find(campaign.occlusions_deg, 0) == campaign.occlusions_deg.end())
-    doubts +=
-        "  doubtful   no occlusion of 0°: without K_T nothing can be fitted for flight; add 0 to occlusions_deg\n";
+  for (const std::string& doubt : doubts_of(campaign)) doubts += "  doubtful   " + doubt + "\n";
   return fmt::format("  {}\n  order {}\n{}", daq::plan_text(campaign, {}, plan_of(campaign)), to_words(campaign.order),
                      doubts);
 }
@@ -315,8 +312,10 @@ void print_report(const CheckedFile& file) {
 }
 
 void print(const CheckedFile& file) {
-  if (file.errors.empty()) fmt::print("{}: valid {}\n{}", file.path, file.kind, file.summary);
-  for (const Json& error : file.errors) fmt::print(stderr, "{}\n", error["message"].get<std::string>());
+  if (file.errors.empty())
+    fmt::print("{}: valid {}\n{}", file.path, file.kind, printable(file.summary, LineEnds::keep));
+  for (const Json& error : file.errors)
+    fmt::print(stderr, "{}\n", printable(error["message"].get<std::string>(), LineEnds::keep));
 }
 
 ExitCode check(const CheckOptions& options) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "compensation/file/plausibility.hpp"
 #include "profiles/profile_reader.hpp"
 
 namespace kphi::profiles {
@@ -130,6 +131,17 @@ Campaign parse_campaign(const std::string& text, const std::string& path) {
 }
 
 Campaign load_campaign(const std::string& path) { return parse_campaign(read_text(path), path); }
+
+std::vector<std::string> doubts_of(const Campaign& campaign) {
+  const std::vector<double>& angles = campaign.occlusions_deg;
+  std::vector<std::string> doubts;
+  if (const auto radians = compensation::doubt_of_angles(angles)) doubts.push_back(*radians);
+  if (std::ranges::find(angles, 0) == angles.end())
+    doubts.emplace_back("no occlusion of 0°: without K_T nothing can be fitted for flight; add 0 to occlusions_deg");
+  else if (angles.size() == 1)
+    doubts.emplace_back("no occlusion but 0°: K_T is fitted, and no k(φ); add occlusions to occlusions_deg");
+  return doubts;
+}
 
 std::string to_words(const Order& order) {
   const bool seeded = order.runs == RunOrderKind::shuffled || order.steps == StepOrderKind::shuffled;

@@ -84,5 +84,8 @@ struct Campaign {
 [[nodiscard]] Campaign load_campaign(const std::string& path);
 /// As load_campaign, from text; `path` only names it in messages.
 [[nodiscard]] Campaign parse_campaign(const std::string& text, const std::string& path);
+/// What is allowed and rarely meant, a line each with the next move: degrees that look like radians, no occlusion of
+/// 0°, one occlusion alone.
+[[nodiscard]] std::vector<std::string> doubts_of(const Campaign& campaign);
 
 }  // namespace kphi::profiles

@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include "base/descriptor.hpp"
+#include "base/number.hpp"
 #include "base/text.hpp"
 
 namespace kphi::results {
@@ -79,8 +80,9 @@ FileLayer& disk() {
 void require_room(const std::filesystem::path& folder, std::uint64_t bytes, FileLayer& files) {
   const std::uint64_t free = on_disk(folder.string(), [&] { return files.free_bytes(folder); });
   if (free >= bytes) return;
-  throw RecordError(fmt::format("disk full: {}: {:.1f} MB needed, {:.1f} MB free; make room or choose another folder",
-                                folder.string(), 1e-6 * static_cast<double>(bytes), 1e-6 * static_cast<double>(free)));
+  throw RecordError(fmt::format("disk full: {}: {} needed, {} free, {} too few; make room or choose another folder",
+                                folder.string(), bytes_in_words(bytes), bytes_in_words(free),
+                                bytes_in_words(bytes - free)));
 }
 
 std::filesystem::path free_name(const std::string& name, const std::string& ending) {

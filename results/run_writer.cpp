@@ -286,9 +286,11 @@ RunDigests RunWriter::finish(const RunEnding& ending, const Views& views) {
   return digests;
 }
 
-std::uint64_t RunWriter::bytes_needed(std::uint64_t samples, std::uint64_t readings) {
-  constexpr std::uint64_t kFixed = 4u << 20;                 // chunks begun, header, attributes
-  return kFixed + (samples * 53 + readings * 24) * 21 / 20;  // with the time of each sample, and the plot
+std::uint64_t RunWriter::bytes_needed(std::uint64_t runs, std::uint64_t samples, std::uint64_t readings) {
+  constexpr std::uint64_t kEachRun = 1u << 20;  // chunks begun, header, attributes
+  constexpr std::uint64_t kBeside = 2u << 20;   // journal and tables
+  return kBeside + runs * kEachRun +
+         (samples * 53 + readings * 24) * 21 / 20;  // with the time of each sample, and the plot
 }
 
 }  // namespace kphi::results

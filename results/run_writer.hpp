@@ -45,8 +45,8 @@ class RunWriter {
   /// Samples appended so far.
   [[nodiscard]] std::uint64_t samples() const;
 
-  /// Bytes of a run of this many samples and readings, with a margin: for require_room().
-  [[nodiscard]] static std::uint64_t bytes_needed(std::uint64_t samples, std::uint64_t readings);
+  /// Bytes of so many runs with this many samples and readings in all, with a margin: for require_room().
+  [[nodiscard]] static std::uint64_t bytes_needed(std::uint64_t runs, std::uint64_t samples, std::uint64_t readings);
 
  private:
   struct File;

@@ -1,4 +1,7 @@
+#include <unistd.h>
+
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <vector>
 
@@ -8,9 +11,12 @@
 #include "daq/audit/bench_audit.hpp"
 #include "daq/bench/air_source.hpp"
 #include "daq/bench/offered_drivers.hpp"
+#include "daq/campaign/operator.hpp"
 #include "daq/hardware/device_locks.hpp"
+#include "daq/hardware/live_bench.hpp"
 #include "daq/hardware/probe.hpp"
 #include "daq/hardware/wake_ups.hpp"
+#include "daq/run/console.hpp"
 #include "daq/run/run.hpp"
 #include "drivers/iq/service/probe.hpp"
 #include "drivers/netbox/receive/probe.hpp"
@@ -30,7 +36,10 @@ struct DevicesRequest {
   bool json = false;
   std::optional<double> clock_gain_s;
   double wake_ups_s = 10;
+  bool switch_on = false;
 };
+
+constexpr std::chrono::seconds kBootTime{5};  // of the module, once it has power
 
 Json to_json(const netbox::Configuration& box) {
   return {{"product", box.product},
@@ -147,6 +156,40 @@ DeviceAnswer ask_motor(const profiles::MotorConfig& config, const Clock& clock, 
   return answer;
 }
 
+/// Whether a person wants the supply's output on, so that the module can answer.
+bool may_switch_on(const DevicesRequest& asked, const profiles::SupplyConfig& supply) {
+  if (asked.switch_on || !isatty(STDIN_FILENO)) return asked.switch_on;
+  Terminal terminal(STDIN_FILENO, stderr);
+  put(stderr,
+      fmt::format("The supply's output is off, so the motor module cannot answer. Nothing will turn, but it will "
+                  "have {:g} V.\n",
+                  supply.voltage.value()));
+  const auto answer = terminal.ask(
+      "Type on and press Enter to switch it on and off again, or only Enter:", [] {}, [] {});
+  return understood(answer.line.value_or("")) == "on";
+}
+
+/// With the supply's output on for as long as it takes.
+DeviceAnswer ask_motor_with_power(const profiles::BenchConfig& bench, const Clock& clock,
+                                  std::optional<double> clock_gain_s) {
+  DeviceAnswer answer{"IQ module " + bench.iq.device};
+  try {
+    ModulePower power(bench, clock);
+    const auto give_up = std::chrono::steady_clock::now() + kBootTime;
+    do {
+      answer = ask_motor(bench.iq, clock, clock_gain_s, false);
+    } while (!answer.answers && std::chrono::steady_clock::now() < give_up);
+    const std::string why = power.off();
+    answer.has_fault = answer.has_fault || !why.empty();
+    answer.lines.push_back(why.empty() ? "note: the supply's output was on to ask it, and is off again"
+                                       : "fault: " + why + "; cut the power of the motor at the switch");
+  } catch (const DeviceError& error) {
+    answer.has_fault = true;
+    answer.lines.push_back(std::string("fault: ") + error.what());
+  }
+  return answer;
+}
+
 void ask_about_air(const profiles::BenchConfig& bench, std::vector<DeviceAnswer>& answers) {
   if (!bench.ambient.sensor.empty()) answers.push_back(ask_sensor(bench.ambient.sensor));
   if (bench.ambient.manual) {
@@ -231,14 +274,16 @@ ExitCode devices(const DevicesRequest& asked) {
                         : ask_load_cell(bench ? bench->netbox : factory, clock, probe_settings(asked, bench)));
   if (bench && bench->supply) answers.push_back(ask_supply(*bench->supply, clock));
   const bool unpowered = bench && bench->supply && answers.back().details.value("output", true) == false;
+  const bool gets_power = unpowered && !bench->motor && may_switch_on(asked, *bench->supply);
   if (bench)
     answers.push_back(bench->motor ? ask_other_motor(*bench, clock)
+                      : gets_power ? ask_motor_with_power(*bench, clock, asked.clock_gain_s)
                                    : ask_motor(bench->iq, clock, asked.clock_gain_s, !unpowered));
-  if (unpowered && !answers.back().answers) {
+  if (unpowered && !gets_power && !answers.back().answers) {
     answers.back().wanted = asked.clock_gain_s.has_value();
-    answers.back().lines = {
-        asked.clock_gain_s ? "fault: clock not measured: the supply's output is off; switch it on by hand, try again"
-                           : "note: cannot answer while the supply's output is off; kphi run switches it on"};
+    answers.back().lines = {asked.clock_gain_s
+                                ? "fault: clock not measured: the supply's output is off; give --switch-on"
+                                : "note: cannot answer while the supply's output is off; give --switch-on to ask it"};
   }
   if (bench) ask_about_air(*bench, answers);
   for (DeviceAnswer& answer : ask_usb(answers)) answers.push_back(std::move(answer));
@@ -274,6 +319,10 @@ void add_devices(CLI::App& program, ExitCode& exit_code) {
             "measure how late this computer wakes kphi, for SECONDS; 0: not")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 3600.0));
+  command
+      .add_flag("--switch-on", asked.switch_on,
+                "switch the supply's output on while the motor module is asked, if it is off; nothing turns")
+      ->needs(bench);
   command.add_flag("--json", asked.json, "print one JSON array");
 }
 

@@ -196,6 +196,8 @@ ExitCode run(const RunOptions& options) {
   Terminal terminal(STDIN_FILENO, stderr);
   const auto operator_ = person(options, answers, config, terminal, end_asked);
   clear_safety_stop(destination, *operator_, answers);
+  if (const auto doubts = profiles::doubts_of(campaign); !doubts.empty() && !destination.resumption)
+    operator_->accept_doubts(fmt::format("{}", fmt::join(doubts, "\n")));
   const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
   summarise(result, destination.folder->path().string(), options.json);
   operator_->finish();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.hpp"
+#include "base/number.hpp"
 #include "drivers/netbox/receive/audit.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/reduction/bin_statistics.hpp"
@@ -42,8 +43,6 @@ std::string minutes(double seconds) {
   return whole < 120 ? fmt::format("{} s", whole) : fmt::format("{} min {:02} s", whole / 60, whole % 60);
 }
 
-std::string gigabytes(std::uint64_t bytes) { return fmt::format("{:.2f} GB", 1e-9 * static_cast<double>(bytes)); }
-
 /// Fills the list, one member per check.
 class Checks {
  public:
@@ -62,6 +61,13 @@ class Checks {
                     "Mach {:.2f}",
                     to_rpm(top), *campaign_.limits["speed_max_rpm"], to_rpm(config_.iq.speed_max), tip,
                     tip / kSpeedOfSound));
+  }
+
+  void occlusions() {
+    for (const std::string& doubt : profiles::doubts_of(campaign_)) {
+      const std::size_t end = doubt.rfind("; ");
+      add(Severity::warning, "occlusions", doubt.substr(0, end), doubt.substr(end + 2));
+    }
   }
 
   void thrust() {
@@ -144,7 +150,7 @@ class Checks {
 
   void disk(std::uint64_t needed, std::uint64_t free, const std::filesystem::path& folder) {
     const std::string words =
-        fmt::format("{} needed, {} free in {}", gigabytes(needed), gigabytes(free), folder.string());
+        fmt::format("{} needed, {} free in {}", bytes_in_words(needed), bytes_in_words(free), folder.string());
     if (needed > free)
       return add(Severity::fault, "disk", words, "free some space, or choose another folder with --out");
     add(Severity::note, "disk", words);
@@ -262,7 +268,7 @@ profiles::Plan longest_plan(Campaign campaign, const profiles::BenchConfig& conf
 
 std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config) {
   const auto readings = static_cast<std::uint64_t>(2 * config.iq.telemetry_hz * plan.bench.value());
-  return results::RunWriter::bytes_needed(plan.samples, readings);
+  return results::RunWriter::bytes_needed(plan.runs.size(), plan.samples, readings);
 }
 
 DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, const std::filesystem::path& out,
@@ -274,6 +280,7 @@ DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, co
   dry.bytes_free = files.free_bytes(folder);
   Checks checks(campaign, config);
   checks.speed();
+  checks.occlusions();
   checks.thrust();
   checks.tell("load cell range",
               "read from the box: `kphi devices --bench BENCH --campaign CAMPAIGN`, or when the run starts");
@@ -311,7 +318,7 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
       range(plan.mountings, most.mountings), profile.until ? "at most " : "", minutes(most.spinning.value()),
       minutes(most.bench.value()),
       time_scale(config) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(config)) : "",
-      1e-6 * static_cast<double>(most.samples), gigabytes(bytes_needed(most, config)));
+      1e-6 * static_cast<double>(most.samples), bytes_in_words(bytes_needed(most, config)));
 }
 
 std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {

@@ -14,7 +14,8 @@ namespace {
   throw ConfigurationError(answers.place(mark) + ": " + what);
 }
 
-/// "Go " is "go".
+}  // namespace
+
 std::string understood(const std::string& typed) {
   const auto first = typed.find_first_not_of(" \t"), last = typed.find_last_not_of(" \t");
   std::string answer = first == std::string::npos ? "" : typed.substr(first, last - first + 1);
@@ -22,8 +23,6 @@ std::string understood(const std::string& typed) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return answer;
 }
-
-}  // namespace
 
 void TerminalOperator::ask(std::string about, const std::string& question, const std::string& retort,
                            const std::function<bool(const std::string& answer)>& accept) {
@@ -68,6 +67,14 @@ void TerminalOperator::clear_safety_stop(const std::string& reason) {
   ask(fmt::format("A safety stop ended this campaign: {}.\nLook at the stand.", reason),
       "Type continue and press Enter, or q to stop:", "You typed \"{}\".\n", [](const std::string& answer) {
         if (answer == "q") throw NotMounted("not continued after the safety stop");
+        return answer == "continue";
+      });
+}
+
+void TerminalOperator::accept_doubts(const std::string& doubts) {
+  ask(fmt::format("Is this meant?\n{}", doubts), "Type continue and press Enter, or q to stop:", "You typed \"{}\".\n",
+      [](const std::string& answer) {
+        if (answer == "q") throw NotMounted("the campaign was not meant so");
         return answer == "continue";
       });
 }

@@ -14,6 +14,9 @@
 
 namespace kphi::daq {
 
+/// What a typed answer means: "Go " is "go".
+[[nodiscard]] std::string understood(const std::string& typed);
+
 /// The person said no, or there was nobody to ask. This mounting is not recorded.
 class NotMounted : public Interrupted {
  public:
@@ -54,6 +57,9 @@ class Operator {
   /// Shows what stopped the campaign and asks whether a person has looked at the stand since. Returns if it may
   /// continue; throws NotMounted if the person says no, ConfigurationError if there is nobody to ask.
   virtual void clear_safety_stop(const std::string& reason);
+  /// Shows what is allowed in the campaign and rarely meant, and asks a person whether it is. Returns if it may begin;
+  /// throws NotMounted if not.
+  virtual void accept_doubts(const std::string&) {}
   /// Asks whether to run the occlusion again; false without a person. Throws Interrupted if the person wants to stop.
   [[nodiscard]] virtual bool run_again(const AnotherRun&) { return false; }
   /// No more questions follow. Throws ConfigurationError if answers are left over.
@@ -110,6 +116,7 @@ class TerminalOperator final : public Operator {
       : terminal_(terminal), words_(words), stop_asked_(std::move(stop_asked)) {}
   [[nodiscard]] bool run_again(const AnotherRun& question) override;
   void clear_safety_stop(const std::string& reason) override;
+  void accept_doubts(const std::string& doubts) override;
   [[nodiscard]] std::string name() const override { return "terminal"; }
 
  protected:

@@ -93,6 +93,13 @@ std::vector<LastWord> last_words(const profiles::BenchConfig& config, const Live
   return words;
 }
 
+/// Throws DeviceError for a supply whose output only this program could switch off again.
+std::vector<LastWord> last_words_of_supply(const profiles::BenchConfig& config, const LiveSupply& supply) {
+  if (supply.off()) return last_words(config, &supply);
+  throw DeviceError(supply.identity(), "switch on", "if kphi died, nobody would switch it off",
+                    "switch it on by hand, and off again");
+}
+
 /// Before the first thread of a device starts.
 SteadyClock make_prompt(SteadyClock clock) {
   real_time::ask_through(&ask_realtime_kit);
@@ -275,6 +282,11 @@ std::string LiveLoadCell::failure() const {
   if (state == netbox::State::silent) return "load cell: the stream fell silent";
   return state == netbox::State::failed ? "load cell: the stream could not be started again" : "";
 }
+
+ModulePower::ModulePower(const profiles::BenchConfig& config, const Clock& clock)
+    : supply_(*config.supply, clock),
+      sentinel_(last_words_of_supply(config, supply_)),
+      on_(supply_, [] { return false; }) {}
 
 LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
     : config_(config),

@@ -82,6 +82,21 @@ class LiveLoadCell final : public LoadCellLink {
   std::string slots_json_;
 };
 
+/// Power for the motor module alone, so that it can be asked who it is: the supply's output is on while this lives, and
+/// a sentinel switches it off if this program dies.
+class ModulePower {
+ public:
+  /// Throws DeviceError, also for a supply that no sentinel can switch off.
+  ModulePower(const profiles::BenchConfig& config, const Clock& clock);
+  /// Empty, or why the output may still be on.
+  [[nodiscard]] std::string off() noexcept { return supply_.switch_off(); }
+
+ private:
+  LiveSupply supply_;
+  Sentinel sentinel_;
+  OutputEnable on_;
+};
+
 class LiveBench final : public Bench {
  public:
   /// Finds all devices; switches the supply on once the others have answered, unless `stop_asked`. Throws DeviceError,

@@ -24,7 +24,7 @@ bool has_turned(const Account& account) { return account.last_speed_at() >= 0; }
 class TwoMountings {
  public:
   TwoMountings() {
-    write(bench.path("two.yaml"), short_campaign_text("90, 180", 1, 2));
+    write(bench.path("two.yaml"), short_campaign_text("0, 180", 1, 2));
     run.emplace(std::vector<std::string>{kphi(), "run", bench.path("two.yaml"), "--bench", bench.path("bench.yaml"),
                                          "--out", bench.path("results")},
                 "", Surroundings{{}, terminal.descriptor(), 0});
@@ -37,7 +37,7 @@ class TwoMountings {
 TEST(TypedAhead, AnswersNoQuestionThatIsStillToBeAsked) {
   TwoMountings stand;
   stand.run->wait_for_prompt();
-  stand.terminal.press("90\n180\n");
+  stand.terminal.press("0\n180\n");
   stand.run->wait_for("Mount the 180° occlusion");
   stand.run->wait_for_prompt();
   stand.terminal.type("q");
@@ -311,7 +311,7 @@ TEST_P(Hands, NeverTurnAMotorWithoutAnAnswerToItsQuestion) {
   const Trial& trial = GetParam();
   const bool spins = trial.verb == std::string("spin");
   RunningBench bench(Manner{.time_scale = spins ? 1.0 : 4.0, .supply = true});
-  write(bench.path("two.yaml"), short_campaign_text("90, 180", 1, 2));
+  write(bench.path("two.yaml"), short_campaign_text("0, 180", 1, 2));
   const std::vector<std::string> run{
       kphi(), "run", bench.path("two.yaml"), "--bench", bench.path("bench.yaml"), "--out", bench.path("results")};
   std::vector<Deeds> all;
@@ -319,7 +319,7 @@ TEST_P(Hands, NeverTurnAMotorWithoutAnAnswerToItsQuestion) {
     Shell shell;
     RandomHands hands(bench, shell, trial.seed);
     for (int i = 0; i < trial.sequences; ++i) {
-      all.push_back(spins ? hands.at(spin(bench, "1"), {"go"}) : hands.at(run, {"90", "180"}));
+      all.push_back(spins ? hands.at(spin(bench, "1"), {"go"}) : hands.at(run, {"0", "180"}));
       ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == false; })) << all.back().story;
       EXPECT_TRUE(safely(std::abs(bench.status()["speed_rad_s"].get<double>()) < 2000)) << all.back().story;
     }

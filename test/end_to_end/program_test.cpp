@@ -13,6 +13,7 @@
 
 #include "results/run_reader.hpp"
 #include "test/end_to_end/running_bench.hpp"
+#include "test/end_to_end/terminal.hpp"
 #include "test/profiles/refusals.hpp"
 
 namespace kphi::test::program_test {
@@ -84,6 +85,61 @@ TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
   EXPECT_THAT(ran(joined(command, {"--clock-gain", "10"}), 3).out,
               HasSubstr("clock not measured: the supply's output is off"))
       << "unless its clock is asked for";
+}
+
+TEST(Program, SwitchesTheSupplyOnToAskTheModuleAtItsUsersWordAlone) {
+  Manner manner;
+  manner.supply = true;
+  RunningBench bench(manner);
+  const std::vector<std::string> command{kphi(), "devices", "--wake-ups", "0", "--bench", bench.path("bench.yaml")};
+  EXPECT_THAT(ran(joined(command, {"--switch-on"})).out,
+              AllOf(HasSubstr("firmware"), HasSubstr("the supply's output was on to ask it, and is off again")));
+  EXPECT_EQ(bench.status()["supply"]["output"], false);
+  for (const char* answer : {"", "no", "On "}) {
+    Terminal terminal;
+    Process devices(command, {}, {{}, terminal.descriptor(), 0});
+    devices.wait_for_prompt({"or only Enter: "});
+    terminal.type(answer);
+    EXPECT_EQ(devices.wait(), 0) << devices.err();
+    EXPECT_EQ(devices.out().find("is off again") != std::string::npos, answer == std::string("On ")) << devices.out();
+    EXPECT_EQ(bench.status()["supply"]["output"], false);
+  }
+  const Account account = bench.account();
+  EXPECT_EQ(account.last_speed_at(), -1) << "and nothing turns";
+}
+
+TEST(Program, ThatIsKilledWhileItAsksTheModuleLeavesNoPowerOn) {
+  Manner manner;
+  manner.supply = true;
+  RunningBench bench(manner);
+  Process devices({kphi(), "devices", "--clock-gain", "600", "--switch-on", "--bench", bench.path("bench.yaml")});
+  ASSERT_TRUE(bench.await([](const json& now) { return now["supply"]["output"] == true; }));
+  devices.signal(SIGKILL);
+  EXPECT_TRUE(safely(bench.await([](const json& now) { return now["supply"]["output"] == false; })));
+}
+
+TEST(Program, AsksAboutADoubtfulCampaignBeforeAnythingHasPower) {
+  Manner manner;
+  manner.supply = true;
+  RunningBench bench(manner);
+  write(bench.path("doubtful.yaml"), short_campaign_text("0.7854, 1.5708", 1, 2));
+  const std::vector<std::string> command{
+      kphi(), "run", bench.path("doubtful.yaml"), "--bench", bench.path("bench.yaml"), "--out", bench.path("results")};
+  EXPECT_THAT(ran(joined(command, {"--dry-run"})).out, HasSubstr("these look like radians; write degrees"));
+  for (const char* answer : {"q", "Continue"}) {
+    Terminal terminal;
+    Process run(command, {}, {{}, terminal.descriptor(), 0});
+    run.wait_for("Is this meant?");
+    run.wait_for_prompt();
+    terminal.type(answer);
+    if (answer == std::string("Continue")) {
+      run.wait_for("Mount the 0.7854° occlusion");
+      run.wait_for_prompt();
+      terminal.type("q");
+    }
+    EXPECT_EQ(run.wait(), 130) << run.err();
+  }
+  EXPECT_EQ(bench.account().last_speed_at(), -1);
 }
 
 TEST(Program, StopsWhenTheBenchVanishesMidRun) {

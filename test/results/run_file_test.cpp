@@ -279,8 +279,9 @@ TEST_F(RunFile, WithoutRoomNothingBegins) {
     std::uint64_t free_bytes(const std::filesystem::path&) override { return 1000; }
   } tiny;
   EXPECT_NO_THROW(require_room("/somewhere", 1000, tiny));
-  EXPECT_THAT(error_of<RecordError>([&] { require_room("/somewhere", RunWriter::bytes_needed(560000, 20000), tiny); }),
-              StartsWith("disk full: /somewhere: "));
+  EXPECT_THAT(
+      error_of<RecordError>([&] { require_room("/somewhere", RunWriter::bytes_needed(1, 560000, 20000), tiny); }),
+      StartsWith("disk full: /somewhere: "));
 }
 
 TEST_F(RunFile, BytesNeededAreEnoughButNotFarOff) {
@@ -289,10 +290,10 @@ TEST_F(RunFile, BytesNeededAreEnoughButNotFarOff) {
   truth.ft_stride = 1;
   run = make_run(truth);
   write_run(path, run);
-  const std::uint64_t needed = RunWriter::bytes_needed(run.load_cell.size(), run.motor.size());
+  const std::uint64_t needed = RunWriter::bytes_needed(1, run.load_cell.size(), run.motor.size());
   EXPECT_GE(needed, std::filesystem::file_size(path));
   EXPECT_LE(needed, 4 * std::filesystem::file_size(path));
-  EXPECT_GT(RunWriter::bytes_needed(0, 1'000'000), 24'000'000u) << "readings";
+  EXPECT_GT(RunWriter::bytes_needed(1, 0, 1'000'000), 24'000'000u) << "readings";
 }
 
 }  // namespace kphi::results::run_file_test

@@ -53,6 +53,23 @@ TEST_F(DryRunOfAShortCampaign, PrintsMountingsAndRunsInTheirOrder) {
   EXPECT_THAT(text, HasSubstr("checks: 0 refused, 1 not checked\n  ok           speed  "));
 }
 
+TEST_F(DryRunOfAShortCampaign, WarnsOfWhatIsAllowedAndRarelyMeant) {
+  EXPECT_EQ(line(dry(), "occlusions"), "");
+  campaign_.occlusions_deg = {45, 90};
+  EXPECT_THAT(line(dry(), "occlusions"), HasSubstr("warning: no occlusion of 0°: without K_T nothing can be fitted"));
+  campaign_.occlusions_deg = {0};
+  EXPECT_THAT(line(dry(), "occlusions"), HasSubstr("no occlusion but 0°: K_T is fitted, and no k(φ)"));
+  campaign_.occlusions_deg = {0, 0.7854, 1.5708};
+  EXPECT_THAT(line(dry(), "occlusions"), HasSubstr("these look like radians"));
+}
+
+TEST_F(DryRunOfAShortCampaign, NeedsRoomForWhatEachRunBeginsWith) {
+  profiles::Plan plan = profiles::make_plan(campaign_, config_);
+  const std::uint64_t few = bytes_needed(plan, config_);
+  plan.runs.resize(10 * plan.runs.size(), plan.runs.front());
+  EXPECT_GT(bytes_needed(plan, config_), few + 20'000'000) << "of the same samples";
+}
+
 TEST_F(DryRunOfAShortCampaign, PrintsTheGuardsOwnLimits) {
   campaign_.limits["torque_max_nm"] = 0.3;
   campaign_.limits["supply_voltage_min_v"] = 10.5;
