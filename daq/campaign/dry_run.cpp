@@ -43,6 +43,11 @@ std::string minutes(double seconds) {
   return whole < 120 ? fmt::format("{} s", whole) : fmt::format("{} min {:02} s", whole / 60, whole % 60);
 }
 
+std::string samples_in_words(std::uint64_t samples) {
+  return samples < 100'000 ? fmt::format("{}", samples)
+                           : fmt::format("{:.1f} million", 1e-6 * static_cast<double>(samples));
+}
+
 /// Fills the list, one member per check.
 class Checks {
  public:
@@ -308,7 +313,7 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
   return fmt::format(
       "{}: propeller {} ({}), occlusions{}, {} repetitions\n"
       "  {} runs of {}{} steps, {:.0f} to {:.0f} RPM, {} each; {} mountings\n"
-      "  {}{} spinning, {} on the bench{}, {:.1f} million samples, {}",
+      "  {}{} spinning, {} on the bench{}, {} samples, {}",
       campaign.name, campaign.propeller.id, campaign.propeller.name, angles,
       range(campaign.repetitions, campaign.repetitions_most.value_or(campaign.repetitions)),
       range(plan.runs.size(), most.runs.size()), profile.until ? "at most " : "", plan.runs.front().steps.size(),
@@ -318,7 +323,7 @@ std::string plan_text(const Campaign& campaign, const profiles::BenchConfig& con
       range(plan.mountings, most.mountings), profile.until ? "at most " : "", minutes(most.spinning.value()),
       minutes(most.bench.value()),
       time_scale(config) > 1 ? fmt::format(" ({:g} times as fast here)", time_scale(config)) : "",
-      1e-6 * static_cast<double>(most.samples), bytes_in_words(bytes_needed(most, config)));
+      samples_in_words(most.samples), bytes_in_words(bytes_needed(most, config)));
 }
 
 std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles::BenchConfig& config) {

@@ -55,7 +55,8 @@ class Stand {
  public:
   Stand(const std::string& scale, const std::string& esc) : scale_(scale), esc_(esc), plant_({}, 1) {}
 
-  /// mount PROPELLER DEGREES; mute scale|esc (it says nothing any more); status: throttle and RPM.
+  /// mount PROPELLER DEGREES; mute scale|esc (it says nothing any more); freeze scale (it repeats its last value);
+  /// status: throttle and RPM.
   std::string answer(const std::string& request) {
     std::istringstream in(request);
     const std::vector<std::string> words(std::istream_iterator<std::string>(in), {});
@@ -63,6 +64,7 @@ class Stand {
       return fmt::format("ok {:.0f} {:.0f}\n", throttle_, to_rpm(RadPerSec(plant_.motor().speed)));
     if (request == "mute scale" || request == "mute esc")
       return (request == "mute esc" ? esc_is_ : scale_is_) = false, "ok\n";
+    if (request == "freeze scale") return scale_is_frozen_ = true, "ok\n";
     const auto angle = words.size() == 3 ? parse_double(words[2]) : std::nullopt;
     const sim::PropellerTruth* propeller = words.size() == 3 ? sim::find_propeller(words[1]) : nullptr;
     if (propeller == nullptr || !angle || words[0] != "mount") return "error expected: mount PROPELLER DEGREES\n";
@@ -113,8 +115,8 @@ class Stand {
   void convert() {
     next_conversion_s_ += 1 / kConversionsPerSecond;
     const double counts = std::round(kCountsPerNewton * sum_ / static_cast<double>(ticks_));
-    say(scale_, scale_is_,
-        fmt::format("L,{},{}", ++conversions_, static_cast<long>(std::clamp(counts, -8388608.0, 8388607.0))));
+    if (!scale_is_frozen_) counts_ = static_cast<long>(std::clamp(counts, -8388608.0, 8388607.0));
+    say(scale_, scale_is_, fmt::format("L,{},{}", ++conversions_, counts_));
     sum_ = 0;
     ticks_ = 0;
   }
@@ -129,6 +131,8 @@ class Stand {
 
   sim::Pty scale_, esc_;
   bool scale_is_ = true, esc_is_ = true;  ///< heard
+  bool scale_is_frozen_ = false;
+  long counts_ = 0;
   sim::Plant plant_;
   std::string heard_;
   double time_s_ = 0, throttle_ = 0, ordered_s_ = -1, next_conversion_s_ = 0, next_line_s_ = 0, sum_ = 0;

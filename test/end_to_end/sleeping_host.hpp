@@ -31,16 +31,16 @@ inline constexpr auto kPatience = std::chrono::seconds(40);
 inline const std::string kQuestion = "Enter, or q to stop:";
 inline const std::string kMountedAngle = "0";
 
-/// One run of three steps, between two ramps up and before a ramp down.
-inline std::string sleepy_campaign_text() {
+/// Runs of three steps, between two ramps up and before a ramp down.
+inline std::string sleepy_campaign_text(const char* occlusions_deg) {
   return fmt::format(
       "format: kphi-campaign/1\nname: short\n"
       "propeller: {{id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}}\n"
-      "occlusions_deg: [0]\nrepetitions: 1\nrepetitions_extra_max: 0\norder: {{steps: up_and_down}}\n"
+      "occlusions_deg: [{}]\nrepetitions: 1\nrepetitions_extra_max: 0\norder: {{steps: up_and_down}}\n"
       "profile: {{steps: 2, dwell_s: 0.6, first_rpm: {}, last_rpm: {}, slew_rpm_s: 2500}}\n"
       "zero_s: 0.6\nminimum_discard_s: 0.3\nsupply_v: 12.0\n"
       "limits: {{speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}}\n",
-      kFirstRpm, kLastRpm);
+      occlusions_deg, kFirstRpm, kLastRpm);
 }
 
 inline bool has(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
@@ -151,7 +151,7 @@ class SleepingHost {
  public:
   explicit SleepingHost(const Sleep& sleep)
       : sleep_(sleep), bench_({1, 7000, "  []\n", sleep.supply}), slept_(bench_.path("slept")) {
-    write(bench_.path("short.yaml"), sleepy_campaign_text());
+    write(bench_.path("short.yaml"), sleepy_campaign_text(sleep.moment == Moment::prompt ? "0, 90" : "0"));
   }
 
   /// Runs the campaign, sleeps once at the moment, and lives on to the program's end. Nothing: the program was past the

@@ -242,6 +242,23 @@ TEST_F(SecondBench, StopsAndCoastsWhenTheScaleFallsSilentInARun) {
   EXPECT_THAT(run.err(), AnyOf(HasSubstr("load-cell sample"), HasSubstr("load cell: no line"))) << "whichever is first";
 }
 
+TEST_F(SecondBench, StopsAndCoastsWhenTheScaleRepeatsOneValue) {
+  test::Process run(command(test::short_campaign_text("0", 1, 40)));
+  ASSERT_TRUE(soon([&] { return rpm() > 5000; }));
+  (void)tell("freeze scale");
+  EXPECT_TRUE(soon([&] { return throttle() == 0; }));
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("repeats one value"));
+}
+
+TEST_F(SecondBench, TurnsNothingOverAScaleThatRepeatsOneValueFromTheStart) {
+  (void)tell("freeze scale");
+  test::Process run(command(test::short_campaign_text("0", 1, 40)));
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_THAT(run.err(), HasSubstr("repeated one value in all"));
+  EXPECT_LT(rpm(), 10);
+}
+
 TEST_F(SecondBench, CoastsByItsBoardWhenKphiIsKilled) {
   test::Process run(command(test::short_campaign_text("0", 1, 40)));
   ASSERT_TRUE(soon([&] { return rpm() > 5000; }));
