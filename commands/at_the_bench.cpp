@@ -7,6 +7,7 @@
 
 #include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
+#include "daq/run/console.hpp"
 #include "drivers/sim/control_line.hpp"
 
 namespace kphi::commands {
@@ -41,6 +42,10 @@ void require_simulator(const profiles::BenchConfig& config) {
   if (simulator_is_missing(config))
     throw DeviceError(
         fmt::format("{0}: its simulator does not run; start it in another terminal: kphi sim {0}", config.path));
+}
+
+void announce_origin(const profiles::BenchConfig& config) {
+  if (config.simulation) daq::put(stderr, "SIMULATED: no propeller turns, no device measures\n");
 }
 
 std::string stamp_of(const daq::Bench& bench) {

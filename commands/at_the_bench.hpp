@@ -34,6 +34,9 @@ class KeysAtTheStand final : public daq::Keys {
 /// Throws DeviceError with the command that starts it.
 void require_simulator(const profiles::BenchConfig& config);
 
+/// Says on stderr that what follows is simulated, if it is.
+void announce_origin(const profiles::BenchConfig& config);
+
 /// When the bench began, as names of records begin: "20210530T080000Z".
 [[nodiscard]] std::string stamp_of(const daq::Bench& bench);
 

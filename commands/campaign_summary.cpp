@@ -6,6 +6,7 @@
 #include "base/text.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/uncertainty/readiness.hpp"
+#include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/plan.hpp"
 #include "results/steps_csv.hpp"
@@ -48,18 +49,12 @@ void take_campaign(const fs::path& file, CampaignSummary& summary) {
   summary.planned = profiles::make_plan(campaign, {}).runs.size();
 }
 
-std::string verdict_words(const std::string& name) {
-  for (const fit::Readiness readiness :
-       {fit::Readiness::fit_to_fly, fit::Readiness::with_care, fit::Readiness::not_yet, fit::Readiness::no_curve})
-    if (name == fit::name_of(readiness)) return fit::words(readiness);
-  return name;
-}
-
 void take_coefficients(const fs::path& file, CampaignSummary& summary) {
   const compensation::Coefficients fitted = compensation::load_coefficients(file.string());
   summary.K_T = fitted.curve.thrust_coefficient().value();
   if (fitted.thrust_coefficient) summary.expanded_95 = fitted.thrust_coefficient->expanded_95;
-  summary.verdict = verdict_words(fitted.verdict);
+  const auto readiness = fit::readiness_named(fitted.verdict);
+  summary.verdict = readiness ? fit::words(*readiness) : fitted.verdict;
 }
 
 }  // namespace
@@ -68,6 +63,8 @@ CampaignSummary summary_of(const results::CampaignFolder& folder) {
   CampaignSummary summary;
   summary.folder = folder.path().string();
   look_at(folder.journal(), summary, [&](const fs::path& file) { take_journal(file, summary); });
+  look_at(folder.bench_file(), summary,
+          [&](const fs::path& file) { summary.origin = name_of(profiles::load_bench(file.string()).origin()); });
   look_at(folder.campaign_file(), summary, [&](const fs::path& file) { take_campaign(file, summary); });
   look_at(folder.steps(), summary, [&](const fs::path& file) {
     for (const results::StepMean& step : results::read_steps(file)) {
@@ -99,8 +96,8 @@ std::string CampaignSummary::next() const {
 Json to_json(const CampaignSummary& summary) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
   Json json;
-  KPHI_JSON_MEMBERS(json, summary, folder, started_utc, campaign, propeller, operator_name, runs, planned, steps,
-                    flagged, not_needed, finished, safety_stop, verdict, damage);
+  KPHI_JSON_MEMBERS(json, summary, folder, origin, started_utc, campaign, propeller, operator_name, runs, planned,
+                    steps, flagged, not_needed, finished, safety_stop, verdict, damage);
   json["K_T"] = number(summary.K_T);
   json["expanded_95"] = number(summary.expanded_95);
   json["next"] = summary.next();
@@ -112,7 +109,9 @@ std::string to_text(const CampaignSummary& summary) {
   const auto line = [&](const char* name, const std::string& value) {
     if (!value.empty()) text += fmt::format("  {:<11} {}\n", name, printable(value));
   };
-  line("measured", summary.started_utc + (summary.operator_name.empty() ? "" : ", by " + summary.operator_name));
+  line("origin", summary.origin);
+  line(summary.origin == name_of(Origin::simulated) ? "simulated" : "measured",
+       summary.started_utc + (summary.operator_name.empty() ? "" : ", by " + summary.operator_name));
   line("campaign", summary.campaign);
   line("propeller", summary.propeller);
   line("runs", summary.progress() + (summary.finished || summary.started_utc.empty() ? "" : ", not finished"));

@@ -14,6 +14,7 @@ struct CampaignSummary {
   std::string folder;
   std::string started_utc;  ///< of the journal's first entry; empty: no journal
   std::string campaign, propeller, operator_name;
+  std::string origin = "unknown";      ///< or measured, simulated
   std::size_t runs = 0, planned = 0;   ///< accepted; 0 planned: unknown
   std::size_t steps = 0, flagged = 0;  ///< of steps.csv
   std::size_t not_needed = 0;          ///< steps that runs left out because k was certain enough

@@ -16,6 +16,7 @@
 #include "compensation/occlusion.hpp"
 #include "daq/campaign/dry_run.hpp"
 #include "drivers/sim/input_files.hpp"
+#include "fit/export/targets.hpp"
 #include "profiles/answers.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
@@ -160,12 +161,14 @@ std::string lines_of(const compensation::Coefficients& c) {
   for (const std::string& doubt : compensation::doubts_of(c)) doubts += "  doubtful   " + doubt + "\n";
   return fmt::format(
       "  propeller  {} ({})\n"
+      "  origin     {}\n"
+      "  verdict    {}\n"
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
       "  curve      k = {} N/(rad/s)^2{}\n"
       "  valid      {:g}° to {:g}°, overlap measured as {}\n"
       "{}{}{}",
-      c.propeller.id, c.propeller.name, c.curve.thrust_coefficient().value(),
-      to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve),
+      c.propeller.id, c.propeller.name, fit::origin_words(c), fit::verdict_words(c),
+      c.curve.thrust_coefficient().value(), to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve),
       c.anchored && c.form == "line" ? ", anchored at K_T" : "", to_degrees(c.smallest_occlusion),
       to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()), trend_of(c.curve), uncertainty_of(c), doubts);
 }

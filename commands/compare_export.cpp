@@ -15,6 +15,7 @@
 #include "fit/propellers/compare.hpp"
 #include "fit/propellers/history.hpp"
 #include "fit/report/fit_summary.hpp"
+#include "fit/uncertainty/readiness.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
 
@@ -81,6 +82,7 @@ ExitCode run_compare(const CompareRequest& request) {
 
 struct ExportRequest {
   std::string file, to, out;
+  bool accept = false;
   ExportOptions options;
 };
 
@@ -105,8 +107,13 @@ void export_run(const ExportRequest& request) {
 }
 
 void export_coefficients(const ExportRequest& request) {
-  const compensation::Coefficients coefficients = load_sealed_coefficients(coefficient_file_of(request.file).string());
-  print_doubts(coefficients.path, compensation::doubts_of(coefficients));
+  const compensation::Coefficients coefficients =
+      load_standing_coefficients(coefficient_file_of(request.file).string());
+  print_standing(coefficients);
+  const auto verdict = readiness_named(coefficients.verdict);
+  if (verdict && *verdict >= Readiness::not_yet && !request.accept)
+    throw DataRejected(fmt::format("{}: {}; nothing is exported; --accept does it all the same", coefficients.path,
+                                   verdict_words(coefficients)));
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
     const Export result = target.write(coefficients, request.options);
@@ -170,6 +177,7 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
   }
   command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
+  command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
   command.add_option("--phi-deg", request.options.phi_deg,
                      "occlusion for targets with one constant per motor (default 0)");
   command.add_option("--speed-max-rpm", request.options.speed_max_rpm, "speed at full output (default: the file's)")

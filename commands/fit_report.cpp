@@ -63,8 +63,9 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
-void write_report(const Fitted& fitted, FitInput& input, const fs::path& page) {
-  const Figures figures = draw_all(fitted, input, page.parent_path() / "figures");
+/// `apart`: how the names of page and figures begin, apart from those of the campaign in the same folder.
+void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {}) {
+  const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"));
   write_page(page, format_report(fitted, {input.provenance, figures}));
 }
 
@@ -280,7 +281,10 @@ ExitCode run_fit(const FitRequest& request) {
         "{}: K_T is {:.3e} N/(rad/s)^2 and must be positive; mirror thrust_axis in the bench file, or import with "
         "--reverse-thrust",
         request.path, K_T));
-  const fs::path file = request.out.empty() ? input.folder / "coefficients.yaml" : fs::path(request.out);
+  // A table that lies in a campaign's folder is not the campaign.
+  const bool is_apart = !input.campaign && fs::exists(input.folder / "journal.jsonl");
+  const std::string apart = is_apart ? fs::path(request.path).stem().string() + "_" : "";
+  const fs::path file = request.out.empty() ? input.folder / (apart + "coefficients.yaml") : fs::path(request.out);
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   const AnalysisOptions options = analysis_options(request, input, identification);
   if (input.table.empty()) input.provenance.bench = options.bench;
@@ -292,13 +296,16 @@ ExitCode run_fit(const FitRequest& request) {
   write_output(file, text);
   print_findings(request, input, fitted, file);
   print_doubts(file.string(), doubts_of(identification));
+  if (input.provenance.origin != Origin::measured)
+    fmt::print(stderr, "origin        {}\n",
+               input.provenance.origin == Origin::simulated ? "SIMULATED, no propeller turned" : "unknown");
   if (!input.provenance.cell_weighed.empty())
     fmt::print(stderr, "calibration   {}; in the ±, not corrected\n", input.provenance.cell_weighed);
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   std::vector<fs::path> written{file};
   if (!request.no_report) {
-    write_report(fitted, input, folder / "report.html");
-    written.push_back(folder / "report.html");
+    write_report(fitted, input, folder / (apart + "report.html"), apart);
+    written.push_back(folder / (apart + "report.html"));
   }
   record(input, folder, written);
   const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;

@@ -40,6 +40,7 @@ Json describe(const std::filesystem::path& path) {
   for (const StreamEvent& event : run.events)
     events.push_back({{"kind", name_of(event.kind)}, {"t_ns", event.time_ns}, {"text", event.text}});
   Json told{{"file", path.string()},
+            {"origin", header.origin.empty() ? "unknown" : header.origin},
             {"outcome", run.outcome == Outcome::complete ? "complete" : "aborted"},
             {"outcome_reason", run.outcome_reason},
             {"campaign", header.campaign_name},
@@ -125,12 +126,7 @@ std::vector<std::string> problems_of_coefficients(const CampaignFolder& folder) 
   const std::string path = folder.coefficients().string();
   if (!std::filesystem::exists(path) || !std::filesystem::exists(folder.journal())) return problems;
   try {
-    const CampaignState state = state_of(read_journal(folder.journal()));
-    for (const auto& run : load_sealed_coefficients(path).provenance.runs) {
-      const auto accepted = std::ranges::find(state.accepted, run.file, &AcceptedRun::file);
-      if (accepted == state.accepted.end() || accepted->digests.sha256 != run.sha256)
-        problems.push_back(path + ": fitted from another " + run.file + " than the journal's; fit again");
-    }
+    problems = unlike_journal(load_sealed_coefficients(path), state_of(read_journal(folder.journal())));
   } catch (const std::runtime_error& error) {
     problems.emplace_back(error.what());
   }

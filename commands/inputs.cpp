@@ -4,12 +4,16 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/number.hpp"
+#include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/plausibility.hpp"
+#include "fit/export/targets.hpp"
 #include "fit/logs/import_table.hpp"
+#include "fit/uncertainty/readiness.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
@@ -28,22 +32,16 @@ using namespace fit;
 
 namespace fs = std::filesystem;
 
-/// Throws DataRejected if the journal or a file beside the runs is not as kphi left it.
-void require_unchanged(const results::CampaignFolder& folder, const results::JournalReading& journal) {
-  const auto [problems, remarks] = results::files_beside(folder, journal);
-  for (const std::string& remark : remarks) fmt::print(stderr, "kphi: {}\n", remark);
-  const std::string& first = !journal.problems.empty() ? journal.problems.front()
-                             : !problems.empty()       ? problems.front()
-                                                       : std::string();
-  if (!first.empty())
-    throw DataRejected(
-        fmt::format("{}; `kphi verify {}` lists all, `kphi replay {}` computes the tables again from the "
-                    "runs, and a table of your own is fitted by its name",
-                    first, folder.path().string(), folder.path().string()));
+/// Of "calibration FT21001, 1e+06 counts/N, …", as journals of older versions have it.
+std::string serial_in(const std::string& words) {
+  constexpr std::string_view kBegin = "calibration ";
+  if (!words.starts_with(kBegin)) return {};
+  return words.substr(kBegin.size(), words.find(", ") - kBegin.size());
 }
 
 /// Rejected runs, accepted ones with the checksums the journal holds, and when the last of them ended; without a
-/// journal the files as they lie there. Returns what the journal says of the load cell.
+/// journal the files as they lie there. Returns the serial of the calibration of the campaign's load cell, by its
+/// journal; empty: unknown, or not the same all the time.
 std::string take_runs(const results::CampaignFolder& folder, Provenance& provenance) {
   if (!fs::exists(folder.journal())) {
     for (const fs::path& run : folder.complete_runs())
@@ -51,31 +49,42 @@ std::string take_runs(const results::CampaignFolder& folder, Provenance& provena
           {fs::relative(run, folder.path()).string(), results::sha256_of_file(run), "", std::nullopt});
     return {};
   }
-  std::string load_cell;
+  std::set<std::string> serials;
   const results::JournalReading journal = results::read_journal(folder.journal());
-  require_unchanged(folder, journal);
+  results::require_intact(folder, [](const std::string& remark) { fmt::print(stderr, "kphi: {}\n", remark); });
   for (const results::JournalEntry& entry : journal.entries) {
     const auto text = [&](const char* key) { return entry.data.value(key, std::string("unknown")); };
-    if (entry.event == results::kCampaignStarted) load_cell = text("load_cell");
+    if (entry.event == results::kCampaignStarted || entry.event == results::kCampaignResumed)
+      serials.insert(entry.data.value("cell_serial", serial_in(entry.data.value("load_cell", std::string()))));
     if (entry.event == results::kRunAborted) provenance.rejected.push_back({text("run"), entry.utc, text("reason")});
     if (entry.event != results::kRunAccepted || !entry.data.contains("file") || !entry.data.contains("sha256"))
       continue;
     provenance.runs.push_back({entry.data["file"], entry.data["sha256"], "", std::nullopt});
     provenance.measured_utc = entry.utc;
   }
-  return load_cell;
+  return serials.size() == 1 ? *serials.begin() : std::string();
 }
 
-/// A weighing of this bench beside the campaign folder, if it was of the same cell.
-void take_weighing(const fs::path& folder, const profiles::BenchConfig& bench, const std::string& load_cell,
+/// A weighing of this bench and this cell beside the campaign folder.
+void take_weighing(const fs::path& folder, const profiles::BenchConfig& bench, const std::string& serial,
                    FitInput& input) {
   const fs::path beside = (fs::absolute(folder) / ".").lexically_normal().parent_path().parent_path();
-  const auto found = results::nearest_weighing(beside, bench.name, bench.thrust_axis, input.provenance.measured_utc);
-  if (!found) return;
-  const std::string when = fmt::format("weighed with {:g} kg on {}", found->mass_kg, found->weighed_utc.substr(0, 10));
-  if (load_cell.find(found->cell_serial + ",") == std::string::npos) {
-    fmt::print(stderr, "calibration   {} was cell {}, the campaign has another ({}): not taken\n", when,
-               found->cell_serial, load_cell);
+  std::optional<results::Weighing> other;
+  const auto of_this_cell = [&](const results::Weighing& one) {
+    if (one.bench != bench.name || one.axis != bench.thrust_axis) return false;
+    const bool same_origin = one.origin.empty() || origin_named(one.origin) == input.provenance.origin;
+    if (!serial.empty() && one.cell_serial == serial && same_origin) return true;
+    other = one;
+    return false;
+  };
+  const auto found = results::nearest_weighing(beside, of_this_cell, input.provenance.measured_utc);
+  const results::Weighing* const one = found ? &*found : other ? &*other : nullptr;
+  if (one == nullptr) return;
+  const std::string when = fmt::format("weighed with {:g} kg on {}", one->mass_kg, one->weighed_utc.substr(0, 10));
+  if (!found) {
+    fmt::print(stderr, "calibration   {} was cell {}{}, the campaign has another ({}): not taken\n", when,
+               printable(one->cell_serial), one->origin.empty() ? "" : ", " + one->origin,
+               serial.empty() ? "unknown" : printable(serial));
     return;
   }
   const results::CellCheck check = results::check_of(*found);
@@ -94,14 +103,16 @@ FitInput campaign_input(const fs::path& path) {
   input.campaign = true;
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
-  const std::string load_cell = take_runs(folder, input.provenance);
+  const std::string serial = take_runs(folder, input.provenance);
+  input.provenance.origin = results::origin_of(input.steps);
   if (fs::exists(folder.bench_file())) {
     input.bench = profiles::load_bench(folder.bench_file().string());
+    if (input.provenance.origin == Origin::unknown) input.provenance.origin = input.bench.origin();
     const profiles::BenchConfig& bench = input.bench;
     input.provenance.stand = bench.name;
     const auto& gain = bench.iq.clock_gain;
     input.provenance.clock = gain ? MotorClock{gain->factor, gain->u_factor} : MotorClock{};
-    take_weighing(path, bench, load_cell, input);
+    take_weighing(path, bench, serial, input);
   }
   if (fs::exists(folder.campaign_file())) {
     input.measured_by = profiles::load_campaign(folder.campaign_file().string());
@@ -125,6 +136,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
     input.table = read_k_table(text, path.string(), unit_of_k);
   } else {
     input.steps = results::parse_steps(text, path.string());
+    input.provenance.origin = results::origin_of(input.steps);
   }
   return input;
 }
@@ -197,10 +209,39 @@ void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients,
   add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
 }
 
+std::vector<std::string> unlike_journal(const compensation::Coefficients& file, const results::CampaignState& state) {
+  std::vector<std::string> problems;
+  for (const auto& run : file.provenance.runs) {
+    const auto accepted = std::ranges::find(state.accepted, run.file, &results::AcceptedRun::file);
+    if (accepted == state.accepted.end() || accepted->digests.sha256 != run.sha256)
+      problems.push_back(file.path + ": fitted from another " + run.file + " than the journal's; fit again");
+  }
+  return problems;
+}
+
+compensation::Coefficients load_standing_coefficients(const std::string& path) {
+  compensation::Coefficients file = load_sealed_coefficients(path);
+  const fs::path parent = fs::path(path).parent_path();
+  if (!fs::exists(parent / "journal.jsonl")) return file;
+  const auto folder = results::CampaignFolder::open(parent.empty() ? "." : parent);
+  results::require_intact(folder);
+  const auto problems = unlike_journal(file, results::state_of(results::read_journal(folder.journal())));
+  if (!problems.empty()) throw DataRejected(problems.front());
+  return file;
+}
+
 compensation::Coefficients load_sealed_coefficients(const std::string& path) {
   compensation::Coefficients file = compensation::load_coefficients(path);
   results::require_seal(results::read_text(path), path);
   return file;
+}
+
+void print_standing(const compensation::Coefficients& file) {
+  if (origin_named(file.origin) != Origin::measured)
+    fmt::print(stderr, "origin        {}: {}\n", file.path, origin_words(file));
+  if (const auto verdict = readiness_named(file.verdict); !verdict || verdict != Readiness::fit_to_fly)
+    fmt::print(stderr, "verdict       {}: {}\n", file.path, verdict_words(file));
+  print_doubts(file.path, compensation::doubts_of(file));
 }
 
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts) {
@@ -218,8 +259,8 @@ compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vecto
   std::map<std::string, compensation::ThrustCurve> curves;
   for (const std::string& path : coefficients) {
     if (curves.contains(path)) continue;
-    const compensation::Coefficients file = load_sealed_coefficients(path);
-    print_doubts(path, compensation::doubts_of(file));
+    const compensation::Coefficients file = load_standing_coefficients(path);
+    print_standing(file);
     const auto mismatch = compensation::overlap_mismatch(file.curve.overlap(), path, vehicle.overlap, vehicle.path);
     if (mismatch) throw ConfigurationError(*mismatch);
     curves.emplace(path, file.curve);

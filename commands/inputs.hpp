@@ -17,6 +17,7 @@
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
 #include "profiles/vehicle.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::commands {
@@ -56,7 +57,16 @@ struct FittedFolder {
 void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients, std::string& vehicle);
 /// As compensation::load_coefficients. Throws DataRejected if the file was changed since it was written.
 [[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path);
-/// Says on stderr, one line each, what of the coefficients is unlike any propeller or stand.
+/// As load_sealed_coefficients. Throws DataRejected, too, if they lie in a campaign folder that is not as kphi left it,
+/// or were fitted from other runs.
+[[nodiscard]] compensation::Coefficients load_standing_coefficients(const std::string& path);
+/// A line for each run behind them that the journal does not have so.
+[[nodiscard]] std::vector<std::string> unlike_journal(const compensation::Coefficients& file,
+                                                      const results::CampaignState& state);
+/// Says on stderr, one line each: that they were not measured, that they are not fit to fly, and what of them is unlike
+/// any propeller or stand.
+void print_standing(const compensation::Coefficients& file);
+/// The last of these alone.
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts);
 
 /// The curves of the vehicle's four rotors, from one coefficient file for all or one for each. Throws

@@ -48,14 +48,15 @@ std::string minute_of(std::string utc) {
 }
 
 void print_table(const std::vector<CampaignSummary>& campaigns) {
-  fmt::print("{:<16}  {:<9} {:<9} {:<24} {:<14} {}\n", "date (UTC)", "propeller", "runs", "K_T in N/(rad/s)^2",
-             "verdict", "folder");
+  fmt::print("{:<16}  {:<9} {:<9} {:<9} {:<24} {:<14} {}\n", "date (UTC)", "origin", "propeller", "runs",
+             "K_T in N/(rad/s)^2", "verdict", "folder");
   for (const CampaignSummary& one : campaigns) {
     const std::string verdict = !one.damage.empty()        ? "damaged"
                                 : !one.safety_stop.empty() ? "safety stop"
                                                            : one.verdict;
-    fmt::print("{:<16}  {:<9} {:<9} {:<24} {:<14} {}\n", minute_of(one.started_utc), printable(one.propeller),
-               one.progress(), one.coefficient(), verdict, fs::path(one.folder).filename().string());
+    fmt::print("{:<16}  {:<9} {:<9} {:<9} {:<24} {:<14} {}\n", minute_of(one.started_utc), one.origin,
+               printable(one.propeller), one.progress(), one.coefficient(), verdict,
+               fs::path(one.folder).filename().string());
   }
 }
 

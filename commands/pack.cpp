@@ -88,8 +88,11 @@ std::string today() {
                      fmt::gmtime(std::chrono::system_clock::to_time_t(std::chrono::system_clock::now())));
 }
 
+bool is_simulated(const CampaignSummary& summary) { return origin_named(summary.origin) == Origin::simulated; }
+
 std::string title_of(const CampaignSummary& summary) {
-  return fmt::format("Thrust of propeller {} over occlusions, campaign {}", summary.propeller, summary.campaign);
+  return fmt::format("{}hrust of propeller {} over occlusions, campaign {}",
+                     is_simulated(summary) ? "Simulated t" : "T", summary.propeller, summary.campaign);
 }
 
 /// RO-Crate 1.2, https://w3id.org/ro/crate/1.2.
@@ -106,8 +109,11 @@ Json metadata_of(const CampaignSummary& summary, const std::vector<PackedFile>& 
   Json root{{"@id", "./"},
             {"@type", "Dataset"},
             {"name", title_of(summary)},
-            {"description", fmt::format("Raw samples, step means and fit of {} runs of a propeller test stand; {}.",
-                                        summary.progress(), kReadme)},
+            {"description", fmt::format("Raw samples, step means and fit of {} runs of a {}; {}.", summary.progress(),
+                                        is_simulated(summary) ? "simulated propeller test stand, not of a real one"
+                                                              : "propeller test stand",
+                                        kReadme)},
+            {"keywords", summary.origin},
             {"datePublished", today()},
             {"license", reference("#licence")},
             {"hasPart", parts},
@@ -121,7 +127,8 @@ Json metadata_of(const CampaignSummary& summary, const std::vector<PackedFile>& 
   graph.push_back({{"@id", "#kphi"}, {"@type", "SoftwareApplication"}, {"name", "kphi"}, {"version", kVersion}});
   graph.push_back({{"@id", "#measurement"},
                    {"@type", "CreateAction"},
-                   {"name", "Measurement on a propeller test stand"},
+                   {"name", is_simulated(summary) ? "Simulation of a propeller test stand by kphi"
+                                                  : "Measurement on a propeller test stand"},
                    {"startTime", summary.started_utc},
                    {"instrument", reference("#kphi")},
                    {"object", reference("campaign.yaml")},
@@ -141,9 +148,8 @@ Json metadata_of(const CampaignSummary& summary, const std::vector<PackedFile>& 
 std::string readme_of(const CampaignSummary& summary) {
   return fmt::format(
       "# {}\n\n"
-      "Measured {} with kphi: a propeller spins through a profile of speeds over occlusions of known angle phi, a "
-      "six-axis\n"
-      "load cell measures the force. {} of {} steps carry a quality flag. K_T = {} N/(rad/s)^2 (95 %), verdict: {}.\n\n"
+      "{} {} with kphi: {}.\n"
+      "{} of {} steps carry a quality flag. K_T = {} N/(rad/s)^2 (95 %), verdict: {}.\n\n"
       "| file | what it is |\n|---|---|\n"
       "| campaign.yaml, bench.yaml | what was asked, and of which stand |\n"
       "| journal.jsonl | what happened, one checksummed line per event |\n"
@@ -156,8 +162,14 @@ std::string readme_of(const CampaignSummary& summary) {
       "    python3 -c \"import pandas; print(pandas.read_csv('steps.csv').head())\"\n"
       "    python3 -c \"import h5py, glob; print(list(h5py.File(sorted(glob.glob('runs/*.h5'))[0])['load_cell']))\"\n\n"
       "Every column and attribute carries its unit in its name.\n",
-      title_of(summary), summary.started_utc, summary.flagged, summary.steps, summary.coefficient(),
-      summary.verdict.empty() ? "not fitted" : summary.verdict, kMetadata, kChecksums);
+      title_of(summary), is_simulated(summary) ? "SIMULATED" : "Measured", summary.started_utc,
+      is_simulated(summary)
+          ? "no propeller turned and no load cell measured; a simulator gave the samples of a stand on which a\n"
+            "propeller spins through a profile of speeds over occlusions of known angle phi"
+          : "a propeller spins through a profile of speeds over occlusions of known angle phi, a six-axis\n"
+            "load cell measures the force",
+      summary.flagged, summary.steps, summary.coefficient(), summary.verdict.empty() ? "not fitted" : summary.verdict,
+      kMetadata, kChecksums);
 }
 
 /// A zip that is written as a whole by close(), or not at all.

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/origin.hpp"
 #include "compensation/units.hpp"
 #include "profiles/limits.hpp"
 
@@ -132,6 +133,8 @@ struct BenchConfig {
   std::optional<Simulation> simulation;
   std::string text;  ///< the file, verbatim
   std::string path;
+
+  [[nodiscard]] Origin origin() const { return simulation ? Origin::simulated : Origin::measured; }
 };
 
 /// "Net Box 192.168.1.1", "IQ module /dev/ttyUSB0", "hx711 /dev/ttyACM0".

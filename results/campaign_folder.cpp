@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/ordered_work.hpp"
 #include "base/text.hpp"
 #include "results/checksums.hpp"
 #include "results/digest.hpp"
@@ -224,7 +225,15 @@ CampaignState state_of(const JournalReading& journal) {
 
 std::vector<std::string> changed_runs(const CampaignFolder& folder, const CampaignState& state) {
   std::vector<std::string> problems;
-  for (const AcceptedRun& run : state.accepted) check_file(folder.path() / run.file, run.digests.sha256, problems);
+  OrderedWork<std::vector<std::string>> checks(
+      [&](const std::vector<std::string>& found) { problems.insert(problems.end(), found.begin(), found.end()); });
+  for (const AcceptedRun& run : state.accepted)
+    checks.add(std::launch::async, [&folder, &run] {
+      std::vector<std::string> found;
+      check_file(folder.path() / run.file, run.digests.sha256, found);
+      return found;
+    });
+  checks.finish();
   return problems;
 }
 
@@ -297,6 +306,25 @@ FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& jou
     found.remarks.push_back(folder.steps().string() +
                             ": not written again after the last run; kphi run --resume or kphi replay computes it");
   return found;
+}
+
+void require_intact(const CampaignFolder& folder, const std::function<void(const std::string&)>& remark) {
+  if (!std::filesystem::exists(folder.journal())) return;
+  const JournalReading journal = read_journal(folder.journal());
+  std::vector<std::string> problems = journal.problems;
+  if (problems.empty()) {
+    FilesBeside beside = files_beside(folder, journal);
+    for (const std::string& text : beside.remarks)
+      if (remark) remark(text);
+    problems = std::move(beside.problems);
+  }
+  if (problems.empty()) problems = changed_runs(folder, state_of(journal));
+  if (!problems.empty())
+    throw DataRejected(
+        fmt::format("{0}; nothing is taken from it: `kphi verify {1}` lists all, `kphi replay {1}` computes the tables "
+                    "again from the "
+                    "runs, and a table of your own is fitted by its name",
+                    problems.front(), folder.path().string()));
 }
 
 CampaignVerification verify_campaign(const CampaignFolder& folder) {

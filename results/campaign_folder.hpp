@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -112,6 +113,10 @@ struct FilesBeside {
   std::vector<std::string> remarks;   ///< tables that were not written again after the last run, by a program that died
 };
 [[nodiscard]] FilesBeside files_beside(const CampaignFolder& folder, const JournalReading& journal);
+
+/// Throws DataRejected if the journal, an accepted run, a table or a copy is not as kphi left it; says on `remark` what
+/// is undamaged, but not as it was left. A folder without a journal is let pass.
+void require_intact(const CampaignFolder& folder, const std::function<void(const std::string&)>& remark = {});
 
 struct CampaignVerification {
   std::size_t entries = 0;            ///< of the journal

@@ -32,7 +32,8 @@ std::optional<std::string> problem_of(const nlohmann::json& data) {
     if (lies_inside(file)) return std::nullopt;
     return fmt::format("names a file outside the folder: {}", printable(file));
   };
-  for (const char* key : {"file", "sha256", "contents_xxh128", "run", "reason", "load_cell", "motor", "supply"})
+  for (const char* key :
+       {"file", "sha256", "contents_xxh128", "run", "reason", "cell_serial", "load_cell", "motor", "supply"})
     if (data.contains(key) && !data[key].is_string()) return fmt::format("has a {} that is no text", key);
   if (data.contains("file"))
     if (auto problem = is_of_folder(data["file"])) return problem;

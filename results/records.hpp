@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/device_data.hpp"
+#include "base/origin.hpp"
 
 namespace kphi::results {
 
@@ -64,6 +65,7 @@ struct LoadCellScale {
 
 /// Everything about a run that is known before the motor turns.
 struct RunHeader {
+  std::string origin;  ///< name of an Origin; empty in the files of older versions
   std::string uuid;
   std::string started_utc;  ///< ISO 8601, Z
   std::string tool_version;

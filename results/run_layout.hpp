@@ -174,6 +174,7 @@ inline constexpr RunGroup<SupplyReading> kSupplyGroup{"supply", "readings of the
 /// Calls visit(name, member) for every root attribute that describes the run. `Header` is RunHeader or const RunHeader.
 template <class Header, class Visit>
 void for_each_attribute(Header& header, Visit&& visit) {
+  if (!header.origin.empty()) visit("origin", header.origin);  // files of older versions have none
   visit("uuid", header.uuid);
   visit("started_utc", header.started_utc);
   visit("tool_version", header.tool_version);

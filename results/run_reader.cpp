@@ -41,6 +41,7 @@ void require_format(const Handle& root, const std::filesystem::path& path) {
 RunHeader header_of(const Handle& root, const std::filesystem::path& path) {
   require_format(root, path);
   RunHeader header;
+  if (hdf5::has_attribute(root, "origin")) hdf5::read_attribute(root, "origin", header.origin);
   for_each_attribute(header, [&](const char* name, auto& value) { hdf5::read_attribute(root, name, value); });
   return header;
 }

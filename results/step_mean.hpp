@@ -1,9 +1,13 @@
 // One row of steps.csv: what one step of one run (or the average of its repetitions) measured.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
+
+#include "base/origin.hpp"
 
 namespace kphi::results {
 
@@ -99,6 +103,17 @@ struct StepMean {
   std::uint64_t speed_glitches = 0;            ///< speeds left out
   double repetitions_averaged = kNotMeasured;  ///< in an average from which repetitions were left out
   double repetitions_left_out = kNotMeasured;
+  double simulated = kNotMeasured;  ///< 1: by a simulator; 0: by devices
 };
+
+/// Simulated if one step is, measured if all are.
+[[nodiscard]] inline Origin origin_of(std::span<const StepMean> steps) {
+  const auto one = [](const StepMean& step) {
+    return std::isnan(step.simulated) ? Origin::unknown : step.simulated != 0 ? Origin::simulated : Origin::measured;
+  };
+  Origin origin = steps.empty() ? Origin::unknown : one(steps.front());
+  for (const StepMean& step : steps) origin = together(origin, one(step));
+  return origin;
+}
 
 }  // namespace kphi::results

@@ -59,12 +59,14 @@ const std::array kColumns{
     StepColumn{"lag_u_s", &StepMean::lag_u_s, 3}, StepColumn{"speed_glitches", &StepMean::speed_glitches, 3},
     // averages
     StepColumn{"repetitions_averaged", &StepMean::repetitions_averaged, 4},
-    StepColumn{"repetitions_left_out", &StepMean::repetitions_left_out, 4}};
+    StepColumn{"repetitions_left_out", &StepMean::repetitions_left_out, 4},
+    // origin
+    StepColumn{"simulated", &StepMean::simulated, 5}};
 
 using Columns = std::vector<StepColumn>;
 
 /// For each group whether one of the steps has a value for its first column.
-using Groups = std::array<bool, 5>;
+using Groups = std::array<bool, 6>;
 constexpr Groups kNoGroups{true};  // but the one of the columns that all have
 
 void take_groups(const StepMean& step, Groups& groups) {

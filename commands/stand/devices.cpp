@@ -261,6 +261,7 @@ ExitCode devices(const DevicesRequest& asked) {
     fmt::print(stderr, "kphi: {}: simulation.in_process has no devices to ask\n", asked.bench);
     return ExitCode::ok;
   }
+  if (bench) announce_origin(*bench);
   if (bench) require_simulator(*bench);
   // Asking starts a stream and resets a module, which would disturb a running measurement.
   const auto locks = lock_devices(bench ? lock_names(*bench)

@@ -129,6 +129,7 @@ struct RunRequest {
 };
 
 ExitCode print_plan(const RunRequest& request) {
+  announce_origin(request.config);
   const auto& [options, campaign, config, answers] = request;
   const DryRun dry = dry_run(campaign, config, options.out, answers);
   fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
@@ -143,6 +144,7 @@ void require_possible(const DryRun& dry) {
 }
 
 void announce(const RunRequest& request, const DryRun& dry) {
+  announce_origin(request.config);
   put(stderr, plan_text(request.campaign, request.config, dry.plan) +
                   "\nCtrl-C coasts the motor, closes the file and stops.\n");
   for (const PlanCheck& check : dry.checks)

@@ -137,6 +137,7 @@ ExitCode spin(const SpinOptions& options) {
   const HandControl::Settings speeds = speeds_of(options, top, bench->clock());
   for (const BenchFinding& found : audit_bench(*bench, campaign, config))
     if (found.finding.severity != Severity::note) put(stderr, found.line() + "\n");
+  announce_origin(config);
   put(stderr, live_greeting(view));
   put(stderr,
       fmt::format("keys: ↑ + faster, ↓ - slower by {:.0f} RPM, Enter or h holds, any other stops{}\n", options.step_rpm,

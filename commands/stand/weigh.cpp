@@ -37,6 +37,7 @@ constexpr double kGravityU = 0.0005;  // of one that was given, m/s²
 
 results::Weighing order_of(const WeighOptions& options, const profiles::BenchConfig& config) {
   results::Weighing weighing;
+  weighing.origin = name_of(config.origin());
   weighing.bench = config.name;
   weighing.tool_version = kVersion;
   weighing.mass_kg = options.kg;
@@ -141,6 +142,7 @@ ExitCode weigh(const WeighOptions& options) {
   };
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
+  announce_origin(config);
   put(stderr, live_greeting(view));
   PrintedProgress printed(stderr, has_terminal(), &describe_weighing);
   const auto progress = view.beside(printed, bench->clock());

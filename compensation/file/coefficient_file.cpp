@@ -387,6 +387,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
     coefficients.slowest_speed = from_rpm(speed->first);
     coefficients.fastest_speed = from_rpm(speed->second);
   }
+  coefficients.origin = top.text_at("origin");
   coefficients.measured_utc = top.text_at("measured_utc");
   coefficients.tool_version = top.text_at("tool_version");
   read_propeller(top.map_at("propeller"), coefficients.propeller);

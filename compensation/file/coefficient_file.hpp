@@ -75,6 +75,7 @@ struct Coefficients {
     std::vector<Run> runs;
   };
   std::string path;
+  std::string origin;  ///< measured, simulated; empty: not told
   std::string measured_utc;
   std::string tool_version;
   Propeller propeller;

@@ -29,6 +29,7 @@ constexpr Kept kKept[] = {
 
 json identity_of(const profiles::Campaign& campaign, const profiles::BenchConfig& config) {
   json identity{{"tool_version", kVersion},
+                {"origin", name_of(config.origin())},
                 {"campaign_sha256", results::sha256(campaign.text)},
                 {"bench_sha256", results::sha256(config.text)}};
   const auto add = [&](const char* key, const std::string& file) {
@@ -44,6 +45,7 @@ json identity_of(const profiles::Campaign& campaign, const profiles::BenchConfig
 void add_devices(json& identity, Bench& bench) {
   identity["motor"] = bench.motor().identity();
   const results::LoadCellScale cell = bench.load_cell().scale();
+  identity["cell_serial"] = cell.serial;
   identity["load_cell"] = fmt::format("calibration {}, {:g} counts/N, {:g} counts/(N m)", cell.serial,
                                       cell.counts_per_newton, cell.counts_per_newton_metre);
   if (bench.supply() != nullptr) identity["supply"] = bench.supply()->identity();

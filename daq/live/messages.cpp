@@ -55,7 +55,7 @@ ordered_json bars_of(const std::vector<GuardLimit>& limits) {
 
 std::string hello_message(const Subject& subject) {
   ordered_json hello{{"type", "hello"}, {"format", "kphi-live/2"}, {"limits", bars_of(subject.limits)}};
-  KPHI_JSON_MEMBERS(hello, subject, replay, by_hand, weighs, name, propeller, speed_max_rpm);
+  KPHI_JSON_MEMBERS(hello, subject, replay, by_hand, weighs, simulated, name, propeller, speed_max_rpm);
   return text_of(hello);
 }
 

@@ -44,6 +44,7 @@ struct Subject {
   std::vector<GuardLimit> limits;  ///< until a guard publishes its own
   bool by_hand = false;            ///< pages may press up, down and hold
   bool weighs = false;             ///< no motor: pages say that the mass is on or off, by hold
+  bool simulated = false;          ///< no device moves
 };
 
 /// `devices`: their reported limits; nullptr: limits of the files only.
@@ -55,7 +56,10 @@ struct Subject {
           campaign.propeller.name,
           first > last ? first : last,
           campaign.minimum_discard,
-          combine_limits(campaign, config, devices)};
+          combine_limits(campaign, config, devices),
+          false,
+          false,
+          config.simulation.has_value()};
 }
 
 /// Members are eight bytes or multiples: no padding.

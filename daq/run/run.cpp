@@ -24,6 +24,7 @@ constexpr int kReadings = 2;  // attempts at the end; a page may be lost
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
   const auto& [campaign, config, mounted, planned, remaining, file, steering, run_number, runs] = order;
   results::RunHeader header;
+  header.origin = name_of(config.origin());
   header.started_utc = utc_text(bench.clock(), bench.clock().now());
   // A name-based UUID: unique by campaign, config in it and time, and reproducible on the deterministic bench.
   const std::string name = fmt::format("{}\n{}\n{}\n{}", campaign.text, file.filename().string(), header.started_utc,

@@ -55,13 +55,15 @@ std::string head(const Identification& identification, const Provenance& provena
   const std::string blades = identification.blades > 0 ? fmt::format("{}", identification.blades) : "unknown";
   return fmt::format(
       "format: {}\n"
+      "origin: {}\n"
       "measured_utc: {}\n"
       "tool_version: {}\n"
       "propeller: {{id: {}, name: {}, diameter_in: {}, blades: {}}}\n"
       "k_unit: N/(rad/s)^2\n"
       "overlap: {}\n",
-      compensation::kCoefficientFormat, provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc),
-      quoted(provenance.tool_version), quoted(identification.propeller),
+      compensation::kCoefficientFormat, name_of(provenance.origin),
+      provenance.measured_utc.empty() ? "unknown" : quoted(provenance.measured_utc), quoted(provenance.tool_version),
+      quoted(identification.propeller),
       quoted(provenance.propeller_name.empty() ? identification.propeller : provenance.propeller_name),
       known_if_positive(identification.diameter_in), blades, compensation::name_of(identification.options.overlap));
 }

@@ -37,6 +37,7 @@ struct MotorClock {
 
 /// Where the numbers come from. An unknown entry is empty and written as `unknown`.
 struct Provenance {
+  Origin origin = Origin::unknown;
   std::string measured_utc;  ///< when the last run ended, ISO 8601, Z; empty: unknown
   std::string tool_version;
   std::string campaign;

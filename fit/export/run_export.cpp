@@ -84,7 +84,8 @@ std::vector<std::string> run_to_mcap(const results::RunRecording& run, std::ostr
   write_phases(run, epoch, writer);
   write_motor(run, epoch, writer);
   write_load_cell(run, epoch, writer);
-  writer.add_metadata("kphi-run", {{"uuid", run.header.uuid},
+  writer.add_metadata("kphi-run", {{"origin", name_of(origin_named(run.header.origin))},
+                                   {"uuid", run.header.uuid},
                                    {"campaign", run.header.campaign_name},
                                    {"propeller", run.header.propeller_id},
                                    {"occlusion_deg", fmt::format("{}", run.header.occlusion_deg)},
@@ -100,7 +101,8 @@ std::vector<std::string> run_to_mcap(const results::RunRecording& run, std::ostr
 std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostream& out) {
   out << "time_s";
   for (const char* axis : kAxes) out << ',' << axis;
-  out << ",ft_sequence,status\n";
+  out << ",ft_sequence,status,origin\n";
+  const char* const origin = name_of(origin_named(run.header.origin));
   const std::vector<Nanoseconds> times = results::sample_times(run);
   std::string row;
   for (std::size_t i = 0; i < times.size(); ++i) {
@@ -108,7 +110,7 @@ std::vector<std::string> run_to_csv(const results::RunRecording& run, std::ostre
     row = fmt::format("{:.9f}", 1e-9 * static_cast<double>(times[i]));
     for (std::size_t axis = 0; axis < kAxes.size(); ++axis)
       fmt::format_to(std::back_inserter(row), ",{:.7g}", physical(record, run.header.load_cell, axis));
-    fmt::format_to(std::back_inserter(row), ",{},{}\n", record.ft_sequence, record.status);
+    fmt::format_to(std::back_inserter(row), ",{},{},{}\n", record.ft_sequence, record.status, origin);
     out << row;
   }
   return {

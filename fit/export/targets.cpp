@@ -12,9 +12,11 @@
 
 #include "base/error.hpp"
 #include "base/number.hpp"
+#include "base/origin.hpp"
 #include "fit/export/mcap_writer.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/report/html.hpp"
+#include "fit/uncertainty/readiness.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -93,6 +95,8 @@ std::string uncertainty_words(const compensation::Coefficients& file) {
   return fmt::format("± {:.2g} (95 %, GUM{})", file.thrust_coefficient->expanded_95, one_line(missing));
 }
 
+bool is_simulated(const compensation::Coefficients& file) { return origin_named(file.origin) == Origin::simulated; }
+
 /// "5x3, Cyclone T5040C; 1.23e-06 N/(rad/s)^2 at phi = 0 deg; measured …, fitted by kphi …; 15 runs", one line each.
 std::vector<std::string> provenance_lines(const compensation::Coefficients& file) {
   const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
@@ -100,8 +104,10 @@ std::vector<std::string> provenance_lines(const compensation::Coefficients& file
           fmt::format("K_T {} N/(rad/s)^2, {}", yaml_number(file.curve.thrust_coefficient().value()),
                       uncertainty_words(file)),
           fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())),
-          fmt::format("measured {}, campaign {}, {} runs, fitted by kphi {}", known(file.measured_utc),
-                      known(file.provenance.campaign), file.provenance.runs.size(), known(file.tool_version)),
+          fmt::format("origin: {}; verdict: {}", origin_words(file), verdict_words(file)),
+          fmt::format("{} {}, campaign {}, {} runs, fitted by kphi {}", is_simulated(file) ? "simulated" : "measured",
+                      known(file.measured_utc), known(file.provenance.campaign), file.provenance.runs.size(),
+                      known(file.tool_version)),
           file.air_density_kg_m3 ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
                                  : "air density unknown; k holds for the air of that day"};
 }
@@ -237,6 +243,8 @@ std::map<std::string, std::string> provenance(const compensation::Coefficients& 
   std::map<std::string, std::string> values{{"propeller", file.propeller.id},
                                             {"k_unit", "N/(rad/s)^2"},
                                             {"K_T", Json(file.curve.thrust_coefficient().value()).dump()},
+                                            {"origin", name_of(origin_named(file.origin))},
+                                            {"verdict", file.verdict},
                                             {"measured_utc", file.measured_utc},
                                             {"tool_version", file.tool_version}};
   for (const auto& parameter : file.parameters) values[parameter.key] = Json(parameter.value).dump();
@@ -245,6 +253,23 @@ std::map<std::string, std::string> provenance(const compensation::Coefficients& 
 }
 
 }  // namespace
+
+std::string origin_words(const compensation::Coefficients& file) {
+  switch (origin_named(file.origin)) {
+    case Origin::measured:
+      return "measured";
+    case Origin::simulated:
+      return "SIMULATED, no propeller turned";
+    case Origin::unknown:
+      break;
+  }
+  return "unknown";
+}
+
+std::string verdict_words(const compensation::Coefficients& file) {
+  const auto readiness = readiness_named(file.verdict);
+  return readiness ? words(*readiness) : "unknown";
+}
 
 std::vector<Turn> parse_turns(const std::string& text) {
   std::vector<Turn> turns;
@@ -363,6 +388,8 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
 Export to_ros2(const compensation::Coefficients& file, const ExportOptions&) {
   Parameters parameters;
   parameters.add("propeller", json_text(file.propeller.id));
+  parameters.add("origin", json_text(name_of(origin_named(file.origin))));
+  parameters.add("verdict", json_text(file.verdict.empty() ? "unknown" : file.verdict));
   parameters.add("overlap", fmt::format("\"{}\"", compensation::name_of(file.curve.overlap())));
   parameters.number("thrust_coefficient_n_s2_per_rad2", file.curve.thrust_coefficient().value());
   const auto& K_T = file.thrust_coefficient;
@@ -409,6 +436,8 @@ Export to_header(const compensation::Coefficients& file, const ExportOptions&) {
   const auto constant = [&](const char* name, double value, const char* what) {
     result.text += fmt::format("constexpr double {} = {};  ///< {}\n", name, yaml_number(value), what);
   };
+  result.text += fmt::format("constexpr bool kSimulated = {};  ///< not by devices\n", is_simulated(file));
+  result.text += fmt::format("constexpr const char* kVerdict = {};\n", json_text(verdict_words(file)));
   constant("kThrustCoefficient", file.curve.thrust_coefficient().value(), "K_T, N/(rad/s)^2");
   if (file.thrust_coefficient)
     constant("kThrustCoefficientExpanded95", file.thrust_coefficient->expanded_95, "half of its 95 % interval (GUM)");
@@ -444,13 +473,14 @@ Export to_csv(const compensation::Coefficients& file, const ExportOptions&) {
   Export result;
   result.text =
       "phi_deg,k_n_s2_per_rad2,u_k_n_s2_per_rad2,expanded_95_k_n_s2_per_rad2,curve_k_n_s2_per_rad2,"
-      "u_curve_k_n_s2_per_rad2,scaling_factor\n";
+      "u_curve_k_n_s2_per_rad2,scaling_factor,origin,verdict\n";
   for (const auto& row : file.table) {
-    result.text += fmt::format("{},{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9),
-                               shortest(row.k.value()), row.uncertainty ? shortest(row.uncertainty->u) : "",
-                               row.uncertainty ? shortest(row.uncertainty->expanded_95) : "",
-                               shortest(curve.at(row.occlusion).value()), error_at(curve, row.occlusion),
-                               shortest(curve.scaling_factor(row.occlusion)));
+    result.text += fmt::format(
+        "{},{},{},{},{},{},{},{},{}\n", shortest(std::round(to_degrees(row.occlusion) * 1e9) / 1e9),
+        shortest(row.k.value()), row.uncertainty ? shortest(row.uncertainty->u) : "",
+        row.uncertainty ? shortest(row.uncertainty->expanded_95) : "", shortest(curve.at(row.occlusion).value()),
+        error_at(curve, row.occlusion), shortest(curve.scaling_factor(row.occlusion)),
+        name_of(origin_named(file.origin)), file.verdict.empty() ? "unknown" : file.verdict);
   }
   result.lost = {"the curve's parameters, covariance, validity, hashes of the runs: only in the coefficient file"};
   return result;

@@ -29,6 +29,11 @@ struct Export {
   std::vector<std::string> lost;  ///< values that the format cannot store, with the reason; one line each
 };
 
+/// "measured", "SIMULATED, no propeller turned", "unknown".
+[[nodiscard]] std::string origin_words(const compensation::Coefficients& file);
+/// "fit to fly", …, "unknown".
+[[nodiscard]] std::string verdict_words(const compensation::Coefficients& file);
+
 /// Throws ConfigurationError for a φ outside the measured range, an unknown speed at full output, or turning directions
 /// of another number of motors.
 [[nodiscard]] Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options);

@@ -16,6 +16,7 @@
 #include "fit/model/identification.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
+#include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/file_layer.hpp"
 #include "results/reduction/bin_statistics.hpp"
@@ -34,6 +35,7 @@ std::string coefficient_name(double phi_deg) { return fmt::format("k({:g}°)", s
 ComparedResult result_of(const compensation::Coefficients& file, const std::string& name) {
   ComparedResult result;
   result.name = name;
+  result.origin = origin_named(file.origin);
   result.propeller = file.propeller.id;
   result.diameter_in = file.propeller.diameter_in;
   if (file.slowest_speed) result.speed_min_rad_s = file.slowest_speed->value();
@@ -68,6 +70,7 @@ ComparedResult result_of_steps(const std::string& file, const std::string& name)
   const ThrustFit fit = fit_thrust(points);
   ComparedResult result;
   result.name = name;
+  result.origin = results::origin_of(steps);
   result.propeller = printable(steps.front().propeller);
   result.diameter_in = steps.front().diameter_in;
   result.speed_min_rad_s = fit.speed_min_rad_s;
@@ -190,6 +193,8 @@ ComparedResult load_result(const std::string& path) {
   const fs::path place(path);
   const fs::path coefficients = fs::is_directory(place) ? place / "coefficients.yaml" : place;
   const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
+  const fs::path folder = fs::is_directory(place) ? place : place.has_parent_path() ? place.parent_path() : ".";
+  if (fs::exists(folder / "journal.jsonl")) results::require_intact(results::CampaignFolder::open(folder));
   if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
   if (fs::exists(coefficients)) {
     const compensation::Coefficients file = compensation::load_coefficients(coefficients.string());
@@ -264,7 +269,12 @@ const char* word(Agreement verdict) {
 }
 
 std::string comparison_table(const Comparison& comparison) {
-  std::string text = fmt::format("A  {}\nB  {}\n", comparison.a.name, comparison.b.name), unit;
+  const auto line = [](const char* letter, const ComparedResult& result) {
+    return fmt::format(
+        "{}  {}{}\n", letter, result.name,
+        result.origin == Origin::measured ? std::string() : fmt::format(" ({})", name_of(result.origin)));
+  };
+  std::string text = line("A", comparison.a) + line("B", comparison.b), unit;
   for (const Difference& entry : comparison.differences) {
     // A table for each unit. fmt pads by display width, so that k(45°) keeps its column.
     if (std::exchange(unit, entry.unit) != entry.unit)

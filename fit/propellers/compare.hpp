@@ -23,6 +23,7 @@ struct ComparedValue {
 
 struct ComparedResult {
   std::string name;  ///< folder or file
+  Origin origin = Origin::unknown;
   std::string propeller;
   double diameter_in = 0;  ///< 0: unknown
   double speed_min_rad_s = 0, speed_max_rad_s = 0;

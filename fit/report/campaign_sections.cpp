@@ -137,7 +137,8 @@ std::string provenance_section(const Identification& identification, const Prove
   const auto& supply = provenance.supply_v;
   html += entry("Supply", supply && std::isfinite(*supply) ? fmt::format("{:g} V", *supply) : "unknown");
   if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
-  html += entry("Measured", known(provenance.measured_utc));
+  html += entry("Origin", name_of(provenance.origin));
+  html += entry("Date", known(provenance.measured_utc));
   html += entry("Fitted by", "kphi " + provenance.tool_version);
   if (!provenance.stand.empty()) html += entry("Bench", provenance.stand);
   if (!provenance.operator_name.empty()) html += entry("Operator", provenance.operator_name);

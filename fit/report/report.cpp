@@ -31,6 +31,14 @@ std::string verdict_box(const FlightReadiness& flight) {
   return html + "</div>\n";
 }
 
+/// Of numbers that no device gave.
+std::string origin_banner(Origin origin) {
+  if (origin == Origin::measured) return {};
+  return fmt::format("<div class=\"origin\"><h3>{}</h3></div>\n",
+                     origin == Origin::simulated ? "Simulated: no propeller turned, no load cell measured"
+                                                 : "It is not known whether these numbers were measured or simulated");
+}
+
 std::string remark_section(std::span<const std::string> remarks) {
   if (remarks.empty()) return {};
   std::string html = "<div class=\"remarks\"><h3>Before you fly this</h3>\n<ul>\n";
@@ -51,7 +59,7 @@ std::string headline(const Fitted& fitted) {
   const CurveFit& curve = fitted.identification.curve_fit;
   const Analysis& analysis = fitted.analysis;
   const Budget& K_T = analysis.coefficients.front();
-  std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0), measured without occlusion", K_T, "");
+  std::string cards = card("Thrust coefficient K<sub>T</sub> = k(0), without occlusion", K_T, "");
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
     if (curve.parameters[i].at_deg != 0.0)  // K_T once more
       cards += card(fmt::format("k(φ), {}: {}", name_of(curve.form), analysis.parameters[i].quantity),
@@ -97,7 +105,10 @@ std::string propeller_line(const Identification& identification, const Provenanc
     text += " · " + provenance.propeller_name;
   if (identification.diameter_in > 0) text += fmt::format(" · {:g} inch", identification.diameter_in);
   if (identification.blades > 0) text += fmt::format(" · {} blades", identification.blades);
-  if (provenance.measured_utc.size() >= 10) text += " · measured " + provenance.measured_utc.substr(0, 10);
+  if (provenance.measured_utc.size() >= 10)
+    text += fmt::format(" · {}{}",
+                        provenance.origin == Origin::unknown ? "" : name_of(provenance.origin) + std::string(" "),
+                        provenance.measured_utc.substr(0, 10));
   if (!provenance.stand.empty()) text += " · bench " + provenance.stand;
   if (!provenance.operator_name.empty()) text += " · by " + provenance.operator_name;
   return html_escaped(text);
@@ -123,7 +134,8 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool
   const auto& [identification, analysis] = fitted;
   const auto& [provenance, figures] = chapter;
   const std::size_t shown = alone ? figures.drawn.size() : 5;
-  std::string html = verdict_box(analysis.flight) + lead(identification) + headline(fitted);
+  std::string html =
+      origin_banner(provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
   html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
           coefficient_section(fitted);
   if (alone) html += standard_section(fitted);

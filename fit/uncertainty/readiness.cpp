@@ -13,6 +13,8 @@
 namespace kphi::fit {
 namespace {
 
+constexpr std::array<std::string_view, 4> kNames{"fit_to_fly", "with_care", "not_yet", "no_curve"};
+
 /// A line that misses a measured k by more than this share of K_T does not give the thrust that was asked for.
 constexpr double kLargestMiss = 0.05;
 
@@ -146,9 +148,11 @@ const char* words(Readiness readiness) {
   return kWords[static_cast<std::size_t>(readiness)];
 }
 
-const char* name_of(Readiness readiness) {
-  constexpr std::array kNames{"fit_to_fly", "with_care", "not_yet", "no_curve"};
-  return kNames[static_cast<std::size_t>(readiness)];
+const char* name_of(Readiness readiness) { return kNames[static_cast<std::size_t>(readiness)].data(); }
+
+std::optional<Readiness> readiness_named(const std::string& name) {
+  const auto found = std::ranges::find(kNames, name);
+  return found == kNames.end() ? std::nullopt : std::optional(static_cast<Readiness>(found - kNames.begin()));
 }
 
 }  // namespace kphi::fit

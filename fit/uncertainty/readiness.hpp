@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -51,5 +52,7 @@ struct ModelTests {
 
 /// "fit_to_fly", "with_care", "not_yet", "no_curve".
 [[nodiscard]] const char* name_of(Readiness readiness);
+/// nullopt for any other name.
+[[nodiscard]] std::optional<Readiness> readiness_named(const std::string& name);
 
 }  // namespace kphi::fit

@@ -213,6 +213,7 @@ class Reduction {
     const auto supply = within(run_.supply, evidence.window);
     take_supply(supply, mean);
     take_air(mean);
+    take_origin(mean);
     mean.window_begin_s = seconds(evidence.window.begin);
     mean.window_end_s = seconds(evidence.window.end);
     mean.discarded_s = seconds(evidence.window.begin - step.whole.begin);
@@ -268,6 +269,11 @@ class Reduction {
       mean.supply_a += reading.current_a / n;
       mean.supply_w += reading.voltage_v * reading.current_a / n;
     }
+  }
+
+  void take_origin(StepMean& mean) const {
+    const Origin origin = origin_named(run_.header.origin);
+    if (origin != Origin::unknown) mean.simulated = origin == Origin::simulated ? 1 : 0;
   }
 
   void take_air(StepMean& mean) const {

@@ -127,8 +127,8 @@ std::string gain_words(const Weighing& weighing, const CellCheck& check) {
 
 std::string format_weighing(const Weighing& weighing) {
   ordered_json file{{"format", kFormat}};
-  KPHI_JSON_MEMBERS(file, weighing, bench, weighed_utc, cell_serial, tool_version, mass_kg, mass_u_kg, gravity_m_s2,
-                    gravity_u_m_s2);
+  KPHI_JSON_MEMBERS(file, weighing, origin, bench, weighed_utc, cell_serial, tool_version, mass_kg, mass_u_kg,
+                    gravity_m_s2, gravity_u_m_s2);
   file["axis"] = std::string(1, "xyz"[weighing.axis]);
   for (const Weighing::Level& level : weighing.levels) {
     ordered_json row;
@@ -148,6 +148,7 @@ Weighing parse_weighing(const std::string& text, const std::string& name) {
     take("weighed_utc", weighing.weighed_utc);
     take("cell_serial", weighing.cell_serial);
     take("tool_version", weighing.tool_version);
+    weighing.origin = file.value("origin", "");
     take("mass_kg", weighing.mass_kg);
     take("mass_u_kg", weighing.mass_u_kg);
     take("gravity_m_s2", weighing.gravity_m_s2);
@@ -175,14 +176,14 @@ Weighing parse_weighing(const std::string& text, const std::string& name) {
   }
 }
 
-std::optional<Weighing> nearest_weighing(const std::filesystem::path& folder, const std::string& bench, int axis,
-                                         const std::string& utc) {
+std::optional<Weighing> nearest_weighing(const std::filesystem::path& folder,
+                                         const std::function<bool(const Weighing&)>& counts, const std::string& utc) {
   std::optional<Weighing> before, after;
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
     if (!entry.path().filename().string().ends_with(kWeighingEnds)) continue;
     Weighing weighing = parse_weighing(read_text(entry.path()), entry.path().string());
-    if (weighing.bench != bench || weighing.axis != axis) continue;
+    if (!counts(weighing)) continue;
     // ISO 8601 sorts as text.
     if (weighing.weighed_utc <= utc) {
       if (!before || before->weighed_utc < weighing.weighed_utc) before = std::move(weighing);

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@ struct Weighing {
   std::string weighed_utc;  ///< ISO 8601, Z
   std::string cell_serial;  ///< of the calibration
   std::string tool_version;
+  std::string origin;                 ///< name of an Origin; empty in the files of older versions
   double mass_kg = 0, mass_u_kg = 0;  ///< conventional mass: that of a weight of 8000 kg/m³ in air of 1.2 kg/m³
   double gravity_m_s2 = kStandardGravity, gravity_u_m_s2 = kGravityAnywhereU;
   int axis = 2;  ///< 0..2: x, y or z of the cell, along which it pulls
@@ -69,9 +71,10 @@ struct CellCheck {
 
 /// "20260704T093000Z_weigh.json".
 inline constexpr const char* kWeighingEnds = "_weigh.json";
-/// The newest weighing in `folder` of this bench along this axis that was made by then (ISO 8601, Z), else the first
-/// one after it; nullopt: none. Throws as parse_weighing.
-[[nodiscard]] std::optional<Weighing> nearest_weighing(const std::filesystem::path& folder, const std::string& bench,
-                                                       int axis, const std::string& utc);
+/// The newest weighing in `folder` that `counts` and was made by then (ISO 8601, Z), else the first one after it;
+/// nullopt: none. Throws as parse_weighing.
+[[nodiscard]] std::optional<Weighing> nearest_weighing(const std::filesystem::path& folder,
+                                                       const std::function<bool(const Weighing&)>& counts,
+                                                       const std::string& utc);
 
 }  // namespace kphi::results

@@ -11,9 +11,11 @@
 
 #include "results/digest.hpp"
 #include "results/file_layer.hpp"
+#include "results/steps_csv.hpp"
 #include "test/compensation/flight/bench_coefficients.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/fit/export/outside_reader.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::test {
 namespace campaigns_test {
@@ -23,6 +25,25 @@ using testing::AnyOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
+
+/// Name → bytes of every file in it.
+std::map<std::string, std::string> contents_of(const fs::path& file) {
+  std::map<std::string, std::string> contents;
+  int code = 0;
+  zip_t* zip = zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code);
+  EXPECT_NE(zip, nullptr) << code;
+  for (zip_int64_t i = 0; zip != nullptr && i < zip_get_num_entries(zip, 0); ++i) {
+    zip_stat_t about;
+    zip_stat_index(zip, static_cast<zip_uint64_t>(i), 0, &about);
+    std::string bytes(about.size, '\0');
+    zip_file_t* one = zip_fopen_index(zip, static_cast<zip_uint64_t>(i), 0);
+    EXPECT_EQ(zip_fread(one, bytes.data(), bytes.size()), static_cast<zip_int64_t>(bytes.size()));
+    zip_fclose(one);
+    contents[about.name] = bytes;
+  }
+  if (zip != nullptr) zip_discard(zip);
+  return contents;
+}
 
 /// One campaign, measured and fitted once for all tests here.
 class Campaigns : public testing::Test {
@@ -58,8 +79,9 @@ fs::path Campaigns::campaign_;
 TEST_F(Campaigns, AreListedWithDatePropellerCoefficientAndVerdict) {
   const Answer list = say({"list", campaign_.parent_path().string()});
   EXPECT_EQ(list.code, 0) << list.err;
-  EXPECT_THAT(list.out,
-              ContainsRegex("2021-05-30 00:00 +5x3 +5 of 5 +1\\.[0-9]+e-06 ± [0-9.e-]+ +fly with care +2021"));
+  EXPECT_THAT(
+      list.out,
+      ContainsRegex("2021-05-30 00:00 +simulated +5x3 +5 of 5 +1\\.[0-9]+e-06 ± [0-9.e-]+ +fly with care +2021"));
   const auto told = nlohmann::json::parse(say({"list", campaign_.parent_path().string(), "--json"}).out);
   ASSERT_EQ(told.size(), 1u);
   EXPECT_EQ(told[0]["runs"], 5);
@@ -67,10 +89,58 @@ TEST_F(Campaigns, AreListedWithDatePropellerCoefficientAndVerdict) {
   EXPECT_NEAR(told[0]["K_T"].get<double>(), 1.55e-6, 0.03e-6);
 }
 
+TEST_F(Campaigns, SayInEachOutputThatTheyAreSimulated) {
+  const TemporaryFolder out;
+  const std::string folder = campaign_.string(), coefficients = (campaign_ / "coefficients.yaml").string();
+  const std::string run = (campaign_ / "runs/5x3_phi090_rep1.h5").string(), bench = (*parent_ / "bench.yaml").string();
+  const std::string vehicle = source_dir() + "/profiles/foldable_drone.yaml";
+  const std::vector<std::vector<std::string>> verbs{
+      {"run", (*parent_ / "campaign.yaml").string(), "--bench", bench, "--dry-run"},
+      {"spin", "--bench", bench, "--rpm", "6000", "--for", "2", "--yes", "--out", (out.path() / "spins").string()},
+      {"list", campaign_.parent_path().string()},
+      {"list", campaign_.parent_path().string(), "--json"},
+      {"info", folder},
+      {"info", folder, "--json"},
+      {"info", run},
+      {"fit", folder},
+      {"fit", folder, "--json"},
+      {"check", coefficients},
+      {"check", bench},
+      {"compare", folder, coefficients},
+      {"compensate", "--coefficients", coefficients, "--vehicle", vehicle},
+      {"fly", "--coefficients", coefficients, "--vehicle", vehicle, "--experiment", "hover_xo_c"},
+      {"export", coefficients, "--to", "agilicious"},
+      {"export", coefficients, "--to", "px4", "--speed-max-rpm", "19000"},
+      {"export", coefficients, "--to", "gazebo"},
+      {"export", coefficients, "--to", "ros2"},
+      {"export", coefficients, "--to", "header"},
+      {"export", coefficients, "--to", "csv"},
+      {"export", coefficients, "--to", "mcap"},
+      {"export", run, "--to", "csv"},
+      {"export", run, "--to", "mcap"}};
+  const auto says_so = [](std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text.find("simulated") != std::string::npos;
+  };
+  for (const std::vector<std::string>& verb : verbs) {
+    const Answer answer = say(verb);
+    const bool is_export = verb[0] == "export";  // what is handed on is the file alone
+    EXPECT_TRUE(says_so(is_export ? answer.out : answer.out + answer.err)) << fmt::format("{}", fmt::join(verb, " "));
+  }
+  for (const char* file : {"journal.jsonl", "coefficients.yaml", "report.html", "runs/5x3_phi090_rep1.h5"})
+    EXPECT_TRUE(says_so(results::read_text(campaign_ / file, 1 << 30))) << file;
+  for (const char* file : {"steps.csv", "means.csv"})
+    for (const auto& step : results::read_steps(campaign_ / file)) EXPECT_EQ(step.simulated, 1) << file;
+  const std::string zip = (out.path() / "c.zip").string();
+  ASSERT_EQ(say({"pack", folder, "--out", zip}).code, 0);
+  for (const auto& [name, bytes] : contents_of(zip))
+    if (name.ends_with("README.md") || name.ends_with("ro-crate-metadata.json")) EXPECT_TRUE(says_so(bytes)) << name;
+}
+
 TEST_F(Campaigns, SayWhatTheyAreAndWhatComesNext) {
   const Answer info = say({"info", campaign_.string()});
   EXPECT_EQ(info.code, 0) << info.err;
-  EXPECT_THAT(info.out, AllOf(HasSubstr("measured    2021-05-30T00:00:00Z"), HasSubstr("runs        5 of 5"),
+  EXPECT_THAT(info.out, AllOf(HasSubstr("simulated   2021-05-30T00:00:00Z"), HasSubstr("runs        5 of 5"),
                               HasSubstr("verdict     fly with care")));
   const TemporaryFolder copy;
   fs::copy(campaign_, copy.path() / "c", fs::copy_options::recursive);
@@ -80,25 +150,6 @@ TEST_F(Campaigns, SayWhatTheyAreAndWhatComesNext) {
               AllOf(HasSubstr("K_T         not fitted"), HasSubstr("next        kphi fit " + folder)));
   std::ofstream(copy.path() / "c/journal.jsonl", std::ios::app) << "{}\n";
   EXPECT_THAT(say({"info", folder}).out, HasSubstr("next        kphi verify " + folder));
-}
-
-/// Name → bytes of every file in it.
-std::map<std::string, std::string> contents_of(const fs::path& file) {
-  std::map<std::string, std::string> contents;
-  int code = 0;
-  zip_t* zip = zip_open(file.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &code);
-  EXPECT_NE(zip, nullptr) << code;
-  for (zip_int64_t i = 0; zip != nullptr && i < zip_get_num_entries(zip, 0); ++i) {
-    zip_stat_t about;
-    zip_stat_index(zip, static_cast<zip_uint64_t>(i), 0, &about);
-    std::string bytes(about.size, '\0');
-    zip_file_t* one = zip_fopen_index(zip, static_cast<zip_uint64_t>(i), 0);
-    EXPECT_EQ(zip_fread(one, bytes.data(), bytes.size()), static_cast<zip_int64_t>(bytes.size()));
-    zip_fclose(one);
-    contents[about.name] = bytes;
-  }
-  if (zip != nullptr) zip_discard(zip);
-  return contents;
 }
 
 TEST_F(Campaigns, ArePackedWholeWithChecksumsAndTheWordsOfAnArchive) {
@@ -228,6 +279,46 @@ TEST_F(CampaignOfSomebody, HoldsNoLinkPipeOrFolderInPlaceOfAFile) {
       fs::rename(kept, place);
     }
   EXPECT_EQ(say({"verify", folder_.string()}).code, 0);
+}
+
+TEST_F(CampaignOfSomebody, GivesNoResultOnceARunHasChanged) {
+  const fs::path run = folder_ / "runs/5x3_phi090_rep1.h5";
+  fs::permissions(run, fs::perms::owner_write, fs::perm_options::add);
+  {
+    std::fstream file(run, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(-40'000, std::ios::end);
+    const char byte = static_cast<char>(file.peek() + 1);
+    file.seekp(-40'000, std::ios::end);
+    file.put(byte);
+  }
+  const std::string folder = folder_.string(), coefficients = (folder_ / "coefficients.yaml").string();
+  const std::string before = results::read_text(coefficients), report = results::read_text(folder_ / "report.html");
+  const std::string vehicle = source_dir() + "/profiles/foldable_drone.yaml";
+  for (const std::vector<std::string>& verb :
+       std::vector<std::vector<std::string>>{{"fit", folder},
+                                             {"fit", folder, "--no-report"},
+                                             {"report", folder},
+                                             {"compare", campaign_.string(), folder},
+                                             {"export", folder, "--to", "ros2"},
+                                             {"compensate", "--coefficients", coefficients, "--vehicle", vehicle},
+                                             {"pack", folder, "--out", zip_.string()}}) {
+    const Answer answer = say(verb);
+    EXPECT_EQ(answer.code, 5) << verb[0];
+    EXPECT_EQ(answer.out, "") << verb[0];
+    EXPECT_THAT(answer.err, HasSubstr("5x3_phi090_rep1.h5: SHA-256 does not match the journal")) << verb[0];
+    EXPECT_EQ(std::ranges::count(answer.err, '\n'), 1) << answer.err;
+  }
+  EXPECT_EQ(results::read_text(coefficients), before);
+  EXPECT_EQ(results::read_text(folder_ / "report.html"), report);
+}
+
+TEST_F(CampaignOfSomebody, KeepsItsCoefficientsWhenATableOfItIsFittedByItsName) {
+  const std::string before = results::read_text(folder_ / "coefficients.yaml");
+  const Answer fit = say({"fit", (folder_ / "steps.csv").string()});
+  EXPECT_EQ(fit.code, 0) << fit.err;
+  EXPECT_EQ(results::read_text(folder_ / "coefficients.yaml"), before);
+  EXPECT_TRUE(fs::exists(folder_ / "steps_coefficients.yaml"));
+  EXPECT_EQ(say({"verify", folder_.string()}).code, 0) << "and all its checksums";
 }
 
 TEST_F(CampaignOfSomebody, HasALineOfChecksumForEachFileOfItsFit) {

@@ -107,7 +107,12 @@ TEST(Weigh, OfAnotherBenchOrCellIsNotTakenUp) {
     return ran({kphi(), "fit", folder}).err;
   };
   EXPECT_THAT(changed("\"bench\": \"test\"", "\"bench\": \"another\""), Not(HasSubstr("weighed")));
-  EXPECT_THAT(changed("FT21001", "FT99999"), HasSubstr("was cell FT99999, the campaign has another"));
+  for (const char* serial : {"FT99999", "21001", "1", "", "FT21001x"})
+    EXPECT_THAT(
+        changed("\"FT21001\"", fmt::format("\"{}\"", serial)),
+        HasSubstr(fmt::format("was cell {}, simulated, the campaign has another (FT21001): not taken", serial)));
+  EXPECT_THAT(changed("\"simulated\"", "\"measured\""), HasSubstr("was cell FT21001, measured, the campaign has"));
+  EXPECT_THAT(changed("FT21001", "FT21001"), HasSubstr("weighed with")) << "and not: not taken";
 }
 
 }  // namespace kphi::test::weigh_test

@@ -324,7 +324,8 @@ const take = {
     Object.assign(state, { question: '', held: {}, run: null, before: new Map() });
     title('');
     text('name', message.name);
-    text('what', message.propeller + (message.replay ? ' · replay of a recorded run' : ''));
+    text('what', message.propeller + (message.simulated ? ' · SIMULATED' : '') +
+      (message.replay ? ' · replay of a recorded run' : ''));
     at('lines').replaceChildren();
     at('hand').hidden = !message.by_hand && !message.weighs;
     document.body.classList.toggle('hand', message.by_hand || message.weighs);

@@ -167,8 +167,8 @@ TEST(RunExport, AsCsvHasUnitsInItsHeader) {
   std::ostringstream out;
   (void)run_to_csv(recording(), out);
   EXPECT_EQ(out.str(),
-            "time_s,force_x_n,force_y_n,force_z_n,torque_x_nm,torque_y_nm,torque_z_nm,ft_sequence,status\n"
-            "2.000000000,1,-2,0.5,1,0,0,7,0\n");
+            "time_s,force_x_n,force_y_n,force_z_n,torque_x_nm,torque_y_nm,torque_z_nm,ft_sequence,status,origin\n"
+            "2.000000000,1,-2,0.5,1,0,0,7,0,unknown\n");
 }
 
 TEST(RunExport, KnowsTheTime) {

@@ -148,12 +148,12 @@ TEST(Report, IsWellFormedAndLoadsNothing) {
 
 TEST(Report, TellsHeadlineTableFlagsRunsAndProvenanceAndNamesAsTextOnly) {
   const std::string html = page();
-  expect_words(html,
-               {"k(0), measured without occlusion</h3><div class=\"value\">(1.5", ") × 10⁻⁶", "N/(rad/s)²", "N/RPM²",
-                "<td>0°</td>", "<td>45°</td>", "<td>90°</td>", "<td>180°</td>", "<td>270°</td>",
-                "commanded speed not reached", "<td class=\"text\">left out</td>", "<td class=\"text\">kept</td>",
-                "<td>560000</td><td>559990</td><td>10</td>", std::string(64, 'b'), "2021-05-30T00:00:00Z", "kphi 0.1.0",
-                "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;co&quot;", "Tom&#39;s 5x4 &amp; more"});
+  expect_words(
+      html, {"k(0), without occlusion</h3><div class=\"value\">(1.5", ") × 10⁻⁶", "N/(rad/s)²", "N/RPM²", "<td>0°</td>",
+             "<td>45°</td>", "<td>90°</td>", "<td>180°</td>", "<td>270°</td>", "commanded speed not reached",
+             "<td class=\"text\">left out</td>", "<td class=\"text\">kept</td>",
+             "<td>560000</td><td>559990</td><td>10</td>", std::string(64, 'b'), "2021-05-30T00:00:00Z", "kphi 0.1.0",
+             "&lt;script&gt;alert(1)&lt;/script&gt; &amp; &quot;co&quot;", "Tom&#39;s 5x4 &amp; more"});
 }
 
 TEST(Report, ListsEveryFlagEventAndRejectionWithItsRun) {

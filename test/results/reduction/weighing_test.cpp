@@ -140,7 +140,8 @@ TEST(NearestWeighing, IsTheNewestOfThatBenchAndAxisBeforeTheCampaign) {
     std::ofstream(folder.path() / name) << format_weighing(weighing);
   };
   const auto found = [&](const char* utc, int axis = 2) {
-    const auto weighing = nearest_weighing(folder.path(), "lab", axis, utc);
+    const auto weighing = nearest_weighing(
+        folder.path(), [&](const Weighing& one) { return one.bench == "lab" && one.axis == axis; }, utc);
     return weighing ? weighing->weighed_utc : std::string("none");
   };
   EXPECT_EQ(found("2026-07-05T00:00:00Z"), "none");
@@ -151,7 +152,10 @@ TEST(NearestWeighing, IsTheNewestOfThatBenchAndAxisBeforeTheCampaign) {
   EXPECT_EQ(found("2026-07-05T00:00:00Z"), "2026-07-03T00:00:00Z");
   EXPECT_EQ(found("2026-06-05T00:00:00Z"), "2026-07-01T00:00:00Z") << "else the first one after it";
   EXPECT_EQ(found("2026-07-05T00:00:00Z", 0), "none");
-  EXPECT_EQ(nearest_weighing(folder.path() / "no", "lab", 2, ""), std::nullopt) << "no such folder";
+  EXPECT_EQ(nearest_weighing(
+                folder.path() / "no", [](const Weighing&) { return true; }, ""),
+            std::nullopt)
+      << "no such folder";
 }
 
 }  // namespace weighing_test
