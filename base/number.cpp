@@ -55,6 +55,10 @@ std::optional<double> parse_finite(std::string_view text) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
+std::string two_digits(double value) {
+  return std::abs(value) >= 99.5 ? fmt::format("{:.0f}", value) : fmt::format("{:.2g}", value);
+}
+
 std::string bytes_in_words(std::uint64_t bytes) {
   constexpr std::array kUnits{"B", "kB", "MB", "GB", "TB"};
   auto value = static_cast<double>(bytes);

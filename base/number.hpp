@@ -24,6 +24,9 @@ void append_shortest(std::string& text, double value);
 /// "1.0081 ± 0.0073": the same without an exponent, for numbers near 1. Six digits where `half_width` is not positive.
 [[nodiscard]] std::string plain_with_error(double value, double half_width);
 
+/// "0.012", "3.4", "210": two digits, without an exponent above 1.
+[[nodiscard]] std::string two_digits(double value);
+
 /// "812 B", "23.41 MB", "1.204 GB": four digits, by powers of 1000.
 [[nodiscard]] std::string bytes_in_words(std::uint64_t bytes);
 

@@ -12,6 +12,9 @@ namespace kphi {
 /// SplitMix64 (Steele, Lea, Flood: Fast splittable pseudorandom number generators, OOPSLA 2014). Any seed will do.
 class SplitMix64 {
  public:
+  using result_type = std::uint64_t;  // for distributions of others
+  static constexpr std::uint64_t min() { return 0; }
+  static constexpr std::uint64_t max() { return UINT64_MAX; }
   static constexpr std::uint64_t kGamma = 0x9e3779b97f4a7c15u;
 
   explicit SplitMix64(std::uint64_t seed) noexcept : state_(seed) {}

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/number.hpp"
 #include "base/text.hpp"
 #include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
@@ -143,16 +144,16 @@ std::string uncertainty_of(const compensation::Coefficients& file) {
   if (!curve.has_uncertainty()) return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
   const std::string missing = fmt::format("{}", fmt::join(file.not_known, ", "));
-  return fmt::format("  speeds     known to {:.2g} % without occlusion, {:.2g} % at {:g}°, standard{}\n",
-                     percent(Radians(0)), percent(curve.largest_fitted()), to_degrees(curve.largest_fitted()),
-                     missing.empty() ? "" : "; unknown and not in it: " + missing);
+  return fmt::format("  speeds     known to {} % without occlusion, {} % at {:g}°, standard{}\n",
+                     two_digits(percent(Radians(0))), two_digits(percent(curve.largest_fitted())),
+                     to_degrees(curve.largest_fitted()), missing.empty() ? "" : "; unknown and not in it: " + missing);
 }
 
 std::string trend_of(const compensation::ThrustCurve& curve) {
   const auto& [per_rad_s, reference] = curve.speed_trend();
   if (per_rad_s == 0) return {};
-  return fmt::format("  speed      k {} by {:.2g} % each 1000 RPM; it is k(φ) at {:.0f} RPM\n",
-                     per_rad_s > 0 ? "rises" : "falls", 100 * std::abs(per_rad_s) * from_rpm(1000).value(),
+  return fmt::format("  speed      k {} by {} % each 1000 RPM; it is k(φ) at {:.0f} RPM\n",
+                     per_rad_s > 0 ? "rises" : "falls", two_digits(100 * std::abs(per_rad_s) * from_rpm(1000).value()),
                      to_rpm(reference));
 }
 

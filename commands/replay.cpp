@@ -30,6 +30,7 @@ using results::StepMean;
 
 struct ReplayRequest {
   std::string path;
+  bool csv = false;
   bool json = false;
   live::LiveOptions live;
   double speed = 1;  ///< recorded seconds per second
@@ -123,7 +124,9 @@ Replay replay_campaign(const CampaignFolder& folder) {
 Replay replay_run(const std::filesystem::path& path) {
   Replay replay(reduced(std::span(&path, 1)));
   const auto runs = std::filesystem::absolute(path).parent_path();
-  if (replay.steps.empty() || runs.filename() != "runs") return replay;
+  // An aborted run is in no table; another run of its occlusion and repetition may be.
+  if (replay.steps.empty() || runs.filename() != "runs" || !results::is_complete_run(path.filename().string()))
+    return replay;
   const auto table = runs.parent_path() / (replay.steps.front().repetition < 0 ? "references.csv" : "steps.csv");
   if (!std::filesystem::exists(table)) return replay;
   replay.stored = table;
@@ -140,8 +143,10 @@ Json to_json(const StepMean& step) {
   return json;
 }
 
-void print(const Replay& replay, bool json) {
-  if (!json) return fmt::print("{}", replay.table);
+void print(const Replay& replay, const ReplayRequest& asked) {
+  if (!asked.json && (asked.csv || !replay.stored)) return fmt::print("{}", replay.table);
+  if (!asked.json && replay.difference) return;
+  if (!asked.json) return fmt::print("{}: agrees, {} steps\n", replay.stored->string(), replay.steps.size());
   Json steps = Json::array();
   for (const StepMean& step : replay.steps) steps.push_back(to_json(step));
   print_json({{"steps", steps},
@@ -153,7 +158,7 @@ void print(const Replay& replay, bool json) {
 ExitCode run_replay(const ReplayRequest& asked) {
   const bool is_campaign = std::filesystem::is_directory(asked.path);
   const Replay result = is_campaign ? replay_campaign(CampaignFolder::open(asked.path)) : replay_run(asked.path);
-  print(result, asked.json);
+  print(result, asked);
   if (!result.difference) return ExitCode::ok;
   fmt::print(stderr, "{}: {}; check the raw files with `kphi verify`\n", result.stored->string(), *result.difference);
   return ExitCode::data_rejected;
@@ -193,6 +198,7 @@ void add_replay(CLI::App& program, ExitCode& exit_code) {
       "kphi replay results/<folder>\nkphi replay results/<folder>/runs/5x3_phi090_rep2.h5 --live --speed 5",
       [](const ReplayRequest& it) { return it.live.any() ? show_replay(it) : run_replay(it); });
   add_argument(command, "PATH", asked.path, "run file or campaign folder")->check(kExistingPath);
+  command.add_flag("--csv", asked.csv, "print the table also where there is one to compare it with");
   command.add_flag("--json", asked.json, "print one JSON object");
   add_live_options(command, asked.live);
   command.add_option("--speed", asked.speed, "with --live or --udp-json: recorded seconds per second")

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "base/origin.hpp"
+#include "base/device_data.hpp"
 #include "compensation/units.hpp"
 #include "profiles/limits.hpp"
 

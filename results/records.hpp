@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/device_data.hpp"
-#include "base/origin.hpp"
 
 namespace kphi::results {
 

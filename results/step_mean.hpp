@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "base/origin.hpp"
+#include "base/device_data.hpp"
 
 namespace kphi::results {
 

@@ -18,7 +18,10 @@ std::string words(const GuardLimit& limit, double value) {
     return fmt::format("kphi was blocked for {:.2g} s while the motor was turning", value);
   if (limit.watched == Watched::recorder_pause)
     return fmt::format("kphi could not write to the run file for {:.2g} s while the motor was turning", value);
-  const std::string shown = limit.unit == "RPM" ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
+  // As many digits as the limit has, and as many more as tell them apart.
+  const std::string bound = fmt::format("{:.4g}", limit.value);
+  std::string shown = limit.unit == "RPM" ? fmt::format("{:.0f}", value) : fmt::format("{:.4g}", value);
+  for (int digits = 5; shown == bound && digits <= 17; ++digits) shown = fmt::format("{:.{}g}", value, digits);
   return fmt::format("{} {} {} is {} ({})", limit.name, shown, limit.unit, to_words(limit), limit.source);
 }
 

@@ -10,9 +10,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "base/device_data.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
-#include "base/origin.hpp"
 #include "fit/export/mcap_writer.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/report/html.hpp"

@@ -11,7 +11,8 @@
 namespace kphi::fit {
 namespace {
 
-/// Steps with the torque in place of the thrust, positive: its sign is only the direction of rotation.
+/// Steps with the torque in place of the thrust, N m for N, positive: its sign is only the direction of rotation. Of
+/// the zero of the torque nothing is known.
 std::vector<results::StepMean> torque_steps(std::span<const results::StepMean> steps) {
   double sum = 0;
   for (const results::StepMean& step : steps) sum += step.torque_nm;
@@ -20,7 +21,8 @@ std::vector<results::StepMean> torque_steps(std::span<const results::StepMean> s
   for (results::StepMean step : steps) {
     step.thrust_n = std::copysign(1.0, sum) * step.torque_nm;
     step.thrust_sd_n = step.torque_sd_nm;
-    step.zero_n = std::numeric_limits<double>::quiet_NaN();
+    step.thrust_u_n = step.torque_sd_nm / std::sqrt(step.thrust_n_eff);
+    step.zero_n = step.zero_u_n = step.zero_moved_n = std::numeric_limits<double>::quiet_NaN();
     result.push_back(std::move(step));
   }
   return result;

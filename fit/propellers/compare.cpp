@@ -11,6 +11,7 @@
 
 #include "base/error.hpp"
 #include "base/json.hpp"
+#include "base/number.hpp"
 #include "base/text.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
@@ -149,10 +150,10 @@ void remark_common_factor(Comparison& comparison) {
   const double factor = sum / weights;
   for (std::size_t i = 0; i < shares.size(); ++i)
     if (std::abs(shares[i] - factor) > 2 * errors[i]) return;
-  comparison.remarks.push_back(fmt::format(
-      "every k of B is {:.2g} % {} by one factor: look at calibration, mounting, clock and air first, not at "
-      "propeller or plates",
-      100 * std::abs(factor), factor < 0 ? "lower" : "higher"));
+  comparison.remarks.push_back(
+      fmt::format("every k of B is {} % {} by one factor: look at calibration, mounting, clock and air first, not at "
+                  "propeller or plates",
+                  two_digits(100 * std::abs(factor)), factor < 0 ? "lower" : "higher"));
 }
 
 /// k · 1.225/ρ, with the error of the density.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/random/normal_distribution.hpp>
 #include <cmath>
 #include <ctime>
 #include <iomanip>
@@ -13,6 +14,7 @@
 
 #include "base/error.hpp"
 #include "base/json.hpp"
+#include "base/number.hpp"
 #include "base/random.hpp"
 
 namespace kphi::fit {
@@ -107,12 +109,12 @@ double chances_of(const std::vector<Hypothesis>& hypotheses, const Series& serie
   constexpr int kDraws = 4000;
   constexpr double kRare = 0.003;
   const double limit = coverage_factor(std::numeric_limits<double>::infinity(), 1 - kRare);
-  Random random(1);
+  SplitMix64 draw(1);
+  boost::random::normal_distribution<double> normal;
   Series noise = series;
   int passed = 0;
   for (int i = 0; i < kDraws; ++i) {
-    for (std::size_t j = 0; j < noise.value.size(); ++j)
-      noise.value[j] = std::sqrt(series.variance[j]) * random.normal();
+    for (std::size_t j = 0; j < noise.value.size(); ++j) noise.value[j] = std::sqrt(series.variance[j]) * normal(draw);
     passed += std::ranges::any_of(hypotheses, [&](const Hypothesis& one) {
       const Step step = fitted(noise, one.x, 0);
       return std::abs(step.size) > limit * step.size_u;
@@ -350,9 +352,9 @@ std::vector<std::string> findings_of(const History& history) {
   }
   if (sentences.empty())
     sentences.push_back(
-        fmt::format("steady: {} campaigns, no shift and no drift beyond chance; they scatter by {:.2g} % "
+        fmt::format("steady: {} campaigns, no shift and no drift beyond chance; they scatter by {} % "
                     "beyond their own uncertainty",
-                    history.entries.size(), 100 * history.charts.front().between));
+                    history.entries.size(), two_digits(100 * history.charts.front().between)));
   return sentences;
 }
 
@@ -379,8 +381,8 @@ std::string history_text(const History& history) {
   }
   text += "\n± is 95 % of what is new in each campaign; * lies outside the limits that hold 99.7 %\n";
   for (const Chart& chart : history.charts)
-    text += fmt::format("{:<15} scatter from campaign to campaign beyond that {:.2g} %\n", name_of(chart.quantity),
-                        100 * chart.between);
+    text += fmt::format("{:<15} scatter from campaign to campaign beyond that {} %\n", name_of(chart.quantity),
+                        two_digits(100 * chart.between));
   text += "\n";
   for (const std::string& line : findings_of(history)) text += line + "\n";
   return text;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 
+#include "base/number.hpp"
 #include "compensation/units.hpp"
 
 namespace kphi::fit {
@@ -38,7 +39,7 @@ double of_both(double p, double q) {
 }
 
 /// "0.32 %", "15 %": two digits, without a sign.
-std::string in_percent(double share) { return fmt::format("{:.2g} %", 100 * std::abs(share)); }
+std::string in_percent(double share) { return two_digits(100 * std::abs(share)) + " %"; }
 
 /// Of the φ whose tests say so most clearly.
 std::optional<Suspicion> of_speed(const Identification& identification, const ModelTests& tests) {

@@ -120,7 +120,7 @@ CellCheck check_of(const Weighing& weighing) {
 std::string gain_words(const Weighing& weighing, const CellCheck& check) {
   const double percent = 100 * (check.gain.value - 1), within = 100 * check.gain.expanded();
   if (std::abs(percent) <= within)
-    return fmt::format("reads right within {:.2g} % along {}", within, "xyz"[weighing.axis]);
+    return fmt::format("reads right within {} % along {}", two_digits(within), "xyz"[weighing.axis]);
   const std::string words = plain_with_error(std::abs(percent), within);
   return fmt::format("reads {} % too {} along {}", words, percent < 0 ? "little" : "much", "xyz"[weighing.axis]);
 }

@@ -28,7 +28,8 @@ TEST(Program, RunsACampaignOverTheRealTransportsAndFitsWhatTheBenchWasBuiltWith)
   EXPECT_THAT(run.err, AllOf(HasSubstr("0 lost"), HasSubstr("step  4/4")));
   EXPECT_THAT(run.err, Not(HasSubstr("\r"))) << "no terminal, no control characters";
   (void)ran({kphi(), "verify", folder});
-  EXPECT_EQ(ran({kphi(), "replay", folder}).out, bytes_of(folder + "/steps.csv"));
+  EXPECT_EQ(ran({kphi(), "replay", folder, "--csv"}).out, bytes_of(folder + "/steps.csv"));
+  EXPECT_THAT(ran({kphi(), "replay", folder}).out, HasSubstr("/steps.csv: agrees, "));
   (void)ran({kphi(), "fit", folder});
   const YAML::Node found = YAML::LoadFile(folder + "/coefficients.yaml");
   const YAML::Node truth = YAML::LoadFile(bench.path("truth.yaml"));

@@ -34,6 +34,7 @@ void Coasting::begin(Exchange& exchange, int times, Instant now) noexcept {
   order_ = exchange.order();
   begun_ = now;
   attempts_ = 1;
+  denials_ = 0;
   next_ = now + exchange.timeout();
   ask(exchange, now);
 }
@@ -48,23 +49,27 @@ void Coasting::take(const QueryResult& result, const Exchange& exchange) noexcep
     pending_ = false;
     confirmed_ = true;
   } else if (!silent()) {
-    // At once if the query was lost or older than the coast; otherwise the module gets some time.
+    // At once if the query was lost or older than the coast; otherwise the module gets some time, and another coast.
+    const bool denied = answered && asked_afterwards;
     blocked_ = false;
-    ask_at_ = answered && asked_afterwards ? result.end + exchange.timeout() / 10 : result.end;
+    ask_at_ = denied ? result.end + exchange.timeout() / 10 : result.end;
+    if (denied && ++denials_ > 1) next_ = std::min(next_, ask_at_);
   }
 }
 
 bool Coasting::advance(Exchange& exchange, Instant now) noexcept {
   if (!pending_) return false;
   if (now >= next_) {
-    const bool tried_enough = attempts_ >= kFewestAttempts && now - begun_ >= reply_timeout_ * kFewestAttempts;
-    if (tried_enough && !silent()) {
+    if (!silent() && has_tried_enough(now)) {
       attempts_ = 0;
       ask_at_ = kNever;
       next_ = now + silence_;
       return true;
     }
-    if (silent()) begun_ = now;
+    if (silent()) {
+      begun_ = now;
+      denials_ = 0;
+    }
     ++attempts_;
     exchange.coast(module_id_, 1, true, now);
     next_ = now + exchange.timeout();
@@ -72,6 +77,12 @@ bool Coasting::advance(Exchange& exchange, Instant now) noexcept {
   }
   if (now >= ask_at_) ask(exchange, now);
   return false;
+}
+
+bool Coasting::has_tried_enough(Instant now) const noexcept {
+  const Duration tried = now - begun_;
+  return (attempts_ >= kFewestAttempts && tried >= reply_timeout_ * kFewestAttempts) ||
+         (denials_ >= kFewestAttempts && tried >= reply_timeout_ / 2);
 }
 
 void Coasting::ask(Exchange& exchange, Instant now) noexcept {

@@ -16,6 +16,8 @@ namespace kphi::iq {
 
 /// A coast, repeated until the module reports drive mode coast to a query sent afterwards. If it does not, the session
 /// falls silent so that the module's own communication timeout can end the motion, and then starts again, without end.
+/// At the latest after five replies in time, and sooner if the module replies five times that it goes on driving: what
+/// it hears meanwhile keeps its timeout from ending that.
 class Coasting {
  public:
   /// `settings` are completed.
@@ -44,13 +46,14 @@ class Coasting {
 
  private:
   void ask(Exchange& exchange, Instant now) noexcept;
+  [[nodiscard]] bool has_tried_enough(Instant now) const noexcept;
 
   int module_id_;
   Duration reply_timeout_, silence_;
   bool pending_ = false, confirmed_ = false;
   std::uint64_t order_ = 0;  ///< of the first coast
   Instant begun_{0};
-  int attempts_ = 0;
+  int attempts_ = 0, denials_ = 0;
   Instant next_{0};
   Instant ask_at_{kNever};
   bool blocked_ = false;  ///< the query is due but had no room: it goes before any poll

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numeric>
+#include <random>
+
 #include "fit/model/identification.hpp"
 #include "fit/report/report.hpp"
 #include "test/fit/campaign_steps.hpp"
@@ -13,6 +17,33 @@ results::StepMean step(double phi, int number, double thrust_n) {
   results::StepMean one = step_at(phi, 1, number);
   one.thrust_n = thrust_n;
   return one;
+}
+
+TEST(Torque, HasAnUncertaintyOfItsOwnThatItsScatterBearsOut) {
+  constexpr double kTruth = 0.013, kNoise_nm = 2e-4;
+  std::vector<double> found, told;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    auto steps = campaign_steps({}, seed);
+    std::mt19937 random(1000 + seed);
+    std::normal_distribution<double> noise(0, kNoise_nm);
+    for (auto& one : steps) {
+      one.torque_nm =
+          -kTruth * CampaignTruth().k(one.occlusion_deg) * one.speed_rad_s * one.speed_rad_s + noise(random);
+      one.torque_sd_nm = 10 * kNoise_nm;
+      one.thrust_n_eff = 100;
+      one.thrust_u_n = one.zero_u_n = one.zero_moved_n = 0.01;  // N, of the thrust
+    }
+    const Identification campaign = identify(steps);
+    const auto torque = analyse(campaign).torque;
+    ASSERT_EQ(torque.size(), 5u);
+    found.push_back(torque[0].k_q.value);
+    told.push_back(torque[0].k_q.u);
+  }
+  const auto mean = [](const std::vector<double>& all) { return std::accumulate(all.begin(), all.end(), 0.0) / 200; };
+  double squares = 0;
+  for (const double one : found) squares += (one - mean(found)) * (one - mean(found)) / 199;
+  EXPECT_NEAR(mean(found), kTruth * CampaignTruth().K_T, 1e-3 * kTruth * CampaignTruth().K_T);
+  EXPECT_NEAR(mean(told) / std::sqrt(squares), 1, 0.3);
 }
 
 TEST(Power, IsThatOfTheSupplyWhereItWasMeasuredElseThatOfTheModule) {

@@ -82,10 +82,10 @@ TEST(Coasting, IsRepeatedUntilConfirmed) {
   SpinningWire wire;
   wire.module.ignore_sets = true;
   wire.coast();
-  wire.run_for(250ms);
+  wire.run_for(25ms);
   EXPECT_FALSE(wire.session.coasting());
   wire.module.ignore_sets = false;
-  wire.run_for(150ms);
+  wire.run_for(25ms);
   EXPECT_TRUE(wire.session.coasting());
   EXPECT_EQ(wire.session.state(), State::ready);
 }
@@ -129,6 +129,17 @@ TEST(Coasting, FallsSilentWhenUnconfirmedSoThatTheModuleTimesOut) {
   wire.run_for(3s);
   EXPECT_TRUE(wire.session.coasting());
   EXPECT_EQ(wire.session.state(), State::failed);
+}
+
+TEST(Coasting, LeavesAModuleThatRepliesAndDoesNotObeyToItsOwnTimeoutAtOnce) {
+  SpinningWire wire;
+  wire.module.ignore_sets = true;
+  const Instant ordered = wire.now;
+  wire.coast();
+  wire.run_for(600ms);
+  EXPECT_EQ(wire.session.state(), State::failed);
+  EXPECT_GE(std::ranges::count_if(wire.batches, [&](const auto& one) { return one.first >= ordered; }), 5);
+  EXPECT_LE(wire.batches.back().first, ordered + 100ms) << "what it hears keeps it from timing out";
 }
 
 TEST(Coasting, IsWhatAModuleThatStoppedAnsweringHearsLast) {
