@@ -35,8 +35,11 @@ void take_journal(const fs::path& file, CampaignSummary& summary) {
   summary.started_utc = journal.entries.front().utc;
   const results::CampaignState state = results::state_of(journal);
   summary.runs = state.accepted.size();
-  for (const results::AcceptedRun& run : state.accepted)
+  for (const results::AcceptedRun& run : state.accepted) {
     summary.not_needed += static_cast<std::size_t>(std::max(0, run.steps_not_needed));
+    const fs::path path = file.parent_path() / run.file;
+    if (summary.damage.empty() && !fs::exists(path)) summary.damage = path.string() + ": missing, but in the journal";
+  }
   summary.finished = state.finished;
   summary.safety_stop = state.safety_stop;
 }

@@ -312,6 +312,15 @@ TEST_F(CampaignOfSomebody, GivesNoResultOnceARunHasChanged) {
   EXPECT_EQ(results::read_text(folder_ / "report.html"), report);
 }
 
+TEST_F(CampaignOfSomebody, SaysWhichOfItsRunsIsMissing) {
+  fs::remove(folder_ / "runs/5x3_phi090_rep1.h5");
+  for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{
+           {"info", folder_.string()}, {"fit", folder_.string()}, {"verify", folder_.string()}}) {
+    const Answer answer = say(verb);
+    EXPECT_THAT(answer.out + answer.err, HasSubstr("5x3_phi090_rep1.h5: missing, but in the journal")) << verb[0];
+  }
+}
+
 TEST_F(CampaignOfSomebody, KeepsItsCoefficientsWhenATableOfItIsFittedByItsName) {
   const std::string before = results::read_text(folder_ / "coefficients.yaml");
   const Answer fit = say({"fit", (folder_ / "steps.csv").string()});

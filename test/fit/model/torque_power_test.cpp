@@ -19,7 +19,7 @@ results::StepMean step(double phi, int number, double thrust_n) {
   return one;
 }
 
-TEST(Torque, HasAnUncertaintyOfItsOwnThatItsScatterBearsOut) {
+TEST(DragTorque, HasAnUncertaintyOfItsOwnThatItsScatterBearsOut) {
   constexpr double kTruth = 0.013, kNoise_nm = 2e-4;
   std::vector<double> found, told;
   for (unsigned seed = 1; seed <= 200; ++seed) {
