@@ -67,6 +67,12 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
   return clearest;
 }
 
+/// There were more occlusions than the curve has numbers.
+bool is_tested(const Curvature& curvature) {
+  return !std::isnan(curvature.lack_of_fit.p) ||
+         (!curvature.quadratic.name.empty() && !std::isnan(curvature.quadratic.p));
+}
+
 std::optional<Suspicion> of_curve(const Identification& identification, const ModelTests& tests) {
   if (identification.alone()) return std::nullopt;
   const CurveFit& fit = identification.curve_fit;
@@ -140,6 +146,14 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
       std::ranges::any_of(identification.table, [](const auto& row) { return !(row.standard_error > 0); }))
     flight.doubts.push_back(
         {Readiness::with_care, "the table gives no u of k: how wrong a k may be is unknown; add its column u_k_…"});
+  if (flight.has_curve && !is_tested(tests.curvature))
+    flight.doubts.push_back(
+        {Readiness::with_care,
+         fmt::format("k(φ) between the occlusions is not tested: {} {} carry a {} of {} numbers; measure another "
+                     "occlusion between them",
+                     identification.curve_fit.points.size(),
+                     identification.curve_fit.points.size() == 1 ? "occlusion" : "occlusions",
+                     name_of(identification.curve_fit.form), identification.curve_fit.parameters.size())});
   std::ranges::stable_sort(flight.doubts, std::greater{}, &Doubt::readiness);
   return flight;
 }

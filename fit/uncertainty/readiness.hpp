@@ -27,7 +27,8 @@ struct Doubt {
 
 struct FlightReadiness {
   /// Worst first. Of the tests of the model (k against speed, the curve's form, a run that stands out) those that fall
-  /// under Holm at 5 % for all together; k that rises with φ; and one repetition, which shows no scatter.
+  /// under Holm at 5 % for all together; k that rises with φ; one repetition, which shows no scatter; and a curve that
+  /// nothing could test.
   std::vector<Doubt> doubts;
   bool has_curve = true;
 

@@ -35,7 +35,7 @@ class Replay : public ::testing::Test {
 };
 
 TEST_F(Replay, OfOneRunComparesItsOwnLines) {
-  const Said said = say(folder_.run("5x3", 90, 2).string());
+  const Said said = say("--csv " + folder_.run("5x3", 90, 2).string());
   EXPECT_EQ(said.code, 0);
   EXPECT_EQ(said.out, results::format_steps(std::span(steps_).last(3)));
 }
@@ -52,6 +52,20 @@ TEST_F(Replay, NamesTheFirstLineThatDiffers) {
   EXPECT_THAT(run.err, HasSubstr("line 6 differs"));
 }
 
+TEST_F(Replay, SaysInOneLineThatATableAgrees) {
+  EXPECT_EQ(say(folder_.path().string()).out, folder_.steps().string() + ": agrees, 6 steps\n");
+}
+
+TEST_F(Replay, OfAnAbortedRunIsHeldAgainstNoOther) {
+  const std::filesystem::path run = folder_.run("5x3", 90, 2), aborted = folder_.runs() / "5x3_phi090_rep2.aborted.h5";
+  std::filesystem::copy(run, aborted);
+  steps_[4].thrust_n += 1;  // of the run that was accepted
+  results::write_steps(folder_.steps(), steps_);
+  const Said said = say(aborted.string());
+  EXPECT_EQ(said.code, 0) << said.err;
+  EXPECT_THAT(said.out, testing::StartsWith("propeller,blades,"));
+}
+
 TEST_F(Replay, MissesAndFindsRows) {
   results::write_steps(folder_.steps(), std::span(steps_).first(5));
   EXPECT_THAT(say(folder_.path().string()).err, HasSubstr("line 7 differs"));
@@ -62,7 +76,7 @@ TEST_F(Replay, MissesAndFindsRows) {
 
 TEST_F(Replay, GivesTheStoredBytesHoweverManyRunsAreUnderWay) {
   for (int i = 0; i < 5; ++i) {
-    const Said said = say(folder_.path().string());
+    const Said said = say("--csv " + folder_.path().string());
     EXPECT_EQ(said.code, 0);
     EXPECT_EQ(said.err, "");
     EXPECT_EQ(said.out, results::read_text(folder_.steps())) << "these were reduced one by one";

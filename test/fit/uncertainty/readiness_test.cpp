@@ -73,6 +73,22 @@ TEST(FlightReadiness, SaysWhatIsWrongWithACampaign) {
   }
 }
 
+TEST(FlightReadiness, IsNotGivenByATestThatCouldNotBeMade) {
+  const auto doubts = [](std::vector<double> occlusions, const CurveOptions& curve) {
+    StudyCampaign campaign = study_campaign({}, 1);
+    std::erase_if(campaign.steps, [&](const results::StepMean& step) {
+      return std::ranges::find(occlusions, step.occlusion_deg) == occlusions.end();
+    });
+    IdentificationOptions options;
+    options.curve = curve;
+    const FlightReadiness flight = analyse(identify(campaign.steps, options), study_options({})).flight;
+    EXPECT_NE(flight.readiness(), Readiness::fit_to_fly);
+    return flight.doubts.empty() ? std::string() : flight.doubts.front().text;
+  };
+  EXPECT_THAT(doubts({0, 90, 180}, {}), HasSubstr("is not tested: 2 occlusions carry a line of 2 numbers"));
+  EXPECT_THAT(doubts({0, 90}, {.anchored = true}), HasSubstr("is not tested: 1 occlusion carry a line of"));
+}
+
 TEST(FlightReadiness, StandsAtTheTopOfScreenFileAndReport) {
   Fitted fitted = analysed(identify(campaign_steps()));
   fitted.analysis.flight = {};
