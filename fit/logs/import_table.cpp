@@ -141,11 +141,7 @@ std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, st
   const auto error = table.find_column("u_" + name);
   std::vector<CurvePoint> points;
   for (const TableRow& row : table.rows) {
-    const double angle = non_negative(table, row, phi);
-    if (std::ranges::find(points, angle, &CurvePoint::phi_deg) != points.end())
-      throw ConfigurationError(
-          fmt::format("{}:{}: phi_deg {:g} is given twice; average the two, or keep one", table.path, row.line, angle));
-    points.push_back({angle, non_negative(table, row, k) * unit,
+    points.push_back({non_negative(table, row, phi), non_negative(table, row, k) * unit,
                       error && !row.fields[*error].empty() ? non_negative(table, row, *error) * unit : 0});
   }
   return points;
