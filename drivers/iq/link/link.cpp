@@ -189,16 +189,17 @@ class Link {
   }
 
   void take_commands() {
-    if (motor_.take_coast()) session_.emergency_stop(clock_.now());
     const std::optional<Commands> commands = motor_.take_commands();
+    // Afterwards, so that none of them was given before a coast that is still to come.
+    if (motor_.take_coast()) session_.emergency_stop(clock_.now());
     has_commands_ = !commands;
     if (commands) apply(*commands);
   }
 
   void apply(const Commands& commands) {
     const Instant now = clock_.now();
-    const bool is_void = commands.after_coasts < motor_.coasts_asked_;  // a coast was asked for afterwards
-    if (commands.stop && !is_void) session_.stop(*commands.stop, now);
+    const bool is_void = commands.after_coasts < motor_.coasts_taken_;  // a coast was asked for afterwards
+    if (commands.stop) session_.stop(*commands.stop, now);  // of a motor that was coasted, it orders no speed
     if (commands.inquiry && session_.state() == Session::State::ready) session_.inquire(*commands.inquiry, now);
     if (!commands.speed || is_void || !session_.armed()) return;
     if (steady_clock::now() < motor_.lease_end()) {

@@ -53,7 +53,6 @@ std::uint64_t Motor::begin_stop(const StopSettings& settings) {
   const std::lock_guard lock(mutex_);
   commands_.speed.reset();
   commands_.stop = settings;
-  commands_.after_coasts = coasts_asked_;
   const std::uint64_t ticket = ++stops_.asked;
   renew();
   commanded_.raise();
@@ -97,7 +96,7 @@ std::vector<StreamEvent> Motor::take_events() {
 std::string Motor::failure() const {
   if (!has_failed_) return "";
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  return lock ? failure_ : "its link does not answer";
+  return lock ? failure_ : "it has failed";
 }
 
 void Motor::refuse(const char* operation, const char* next_move) const {

@@ -33,7 +33,7 @@ inline constexpr Duration kLease = std::chrono::milliseconds(500);
 /// The commands of callers to the link's thread.
 struct Commands {
   std::optional<RadPerSec> speed;
-  std::uint64_t after_coasts = 0;  ///< of the speed: how many coasts had been asked for before it
+  std::uint64_t after_coasts = 0;  ///< how many coasts had been asked for before the speed
   std::optional<StopSettings> stop;
   std::optional<std::vector<Inquiry>> inquiry;
 };

@@ -119,8 +119,17 @@ TEST(Motor, VoidsEachSpeedOfBeforeACoast) {
     stand.motor->spin_at(RadPerSec(300 + i));
     stand.motor->emergency_stop();
   }
-  EXPECT_TRUE(soon([&] { return stand.line.left_coasting(); }, 1000ms));
+  EXPECT_TRUE(soon([&] { return stand.line.left_coasting(); }, 300ms)) << "before the lease ends it";
   EXPECT_TRUE(stand.motor->stop().safe());
+}
+
+TEST(Motor, ReportsAStopThatACoastOverruled) {
+  Stand stand;
+  for (int i = 0; i < 50; ++i) {  // at rest, and nothing has turned before
+    const std::uint64_t ticket = stand.motor->begin_stop({});
+    stand.motor->emergency_stop();
+    ASSERT_TRUE(soon([&] { return stand.motor->stop_report(ticket).has_value(); }, 5000ms)) << i;
+  }
 }
 
 TEST(Motor, MayBeAskedAfterItWasClosed) {
