@@ -34,13 +34,13 @@ std::optional<std::string> problem_of(const nlohmann::json& data) {
   };
   for (const char* key :
        {"file", "sha256", "contents_xxh128", "run", "reason", "cell_serial", "load_cell", "motor", "supply"})
-    if (data.contains(key) && !data[key].is_string()) return fmt::format("has a {} that is no text", key);
+    if (data.contains(key) && !data[key].is_string()) return fmt::format("{} must be a text", key);
   if (data.contains("file"))
     if (auto problem = is_of_folder(data["file"])) return problem;
   if (!data.contains("files")) return std::nullopt;
-  if (!data["files"].is_object()) return "has files that are no object";
+  if (!data["files"].is_object()) return "files must be an object";
   for (const auto& [file, digest] : data["files"].items()) {
-    if (!digest.is_string()) return fmt::format("has a digest of {} that is no text", printable(file));
+    if (!digest.is_string()) return fmt::format("the SHA-256 of {} must be a text", printable(file));
     if (auto problem = is_of_folder(file)) return problem;
   }
   return std::nullopt;

@@ -57,7 +57,7 @@ TEST_F(JournalFile, HoldsUnderEachKeyWhatItsReadersExpect) {
     return reading.problems.empty() ? "" : reading.problems.front();
   };
   EXPECT_EQ(problem(R"({"file":"runs/a.h5","sha256":"00","steps_not_needed":2})"), "");
-  EXPECT_EQ(problem(R"({"file":5})"), "journal.jsonl:1: has a file that is no text");
+  EXPECT_EQ(problem(R"({"file":5})"), "journal.jsonl:1: file must be a text");
   EXPECT_EQ(problem(R"({"file":"/dev/zero"})"), "journal.jsonl:1: names a file outside the folder: /dev/zero");
   EXPECT_EQ(problem(R"({"files":{"../../etc/passwd":"00"}})"),
             "journal.jsonl:1: names a file outside the folder: ../../etc/passwd");

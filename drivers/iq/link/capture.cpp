@@ -46,7 +46,7 @@ bool is_capture_or_nothing(const std::string& path) {
 
 Capture::Capture(const std::string& path) {
   if (!is_capture_or_nothing(path))
-    throw DeviceError("capture " + path, "create", "exists, and is no capture", "choose another file");
+    throw DeviceError("capture " + path, "create", "another file has this name", "choose another file");
   file_ = Descriptor(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (file_.number() < 0) throw DeviceError("capture " + path, "create", std::strerror(errno), "choose another file");
   waiting_.assign(kTitle, kTitle + sizeof kTitle - 1);
