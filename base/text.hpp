@@ -14,7 +14,7 @@
 
 namespace kphi {
 
-/// In bytes: what is longer is no text of lines.
+/// In bytes; a longer line means a binary file.
 inline constexpr std::size_t kLongestLine = std::size_t{1} << 20;
 
 /// The next line of a stream, without its end; false at the end. Throws std::runtime_error ("cause; next move") beyond

@@ -24,7 +24,7 @@ std::string verdict_box(const FlightReadiness& flight) {
   std::string html =
       fmt::format("<div class=\"verdict {}\"><h3>{}</h3>\n", name_of(flight.readiness()),
                   !flight.has_curve ? "K<sub>T</sub> alone: no occlusion was measured, so there is no k(φ) to fly with"
-                  : flight.doubts.empty()                    ? "Fit to fly: each test of the model was made and passed"
+                  : flight.doubts.empty() ? "Fit to fly: each test of the model that could be made passed"
                   : flight.readiness() == Readiness::not_yet ? "Do not fly yet"
                                                              : "Fly with care");
   for (const Doubt& doubt : flight.doubts) html += "<p>" + typeset(doubt.text) + "</p>\n";
