@@ -143,10 +143,12 @@ std::string uncertainty_of(const compensation::Coefficients& file) {
   const compensation::ThrustCurve& curve = file.curve;
   if (!curve.has_uncertainty()) return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
-  const std::string missing = fmt::format("{}", fmt::join(file.not_known, ", "));
+  std::string more;
+  if (!file.assumed.empty()) more += fmt::format("; assumed in it: {}", fmt::join(file.assumed, ", "));
+  if (!file.not_known.empty()) more += fmt::format("; unknown and not in it: {}", fmt::join(file.not_known, ", "));
   return fmt::format("  speeds     known to {} % without occlusion, {} % at {:g}°, standard{}\n",
                      two_digits(percent(Radians(0))), two_digits(percent(curve.largest_fitted())),
-                     to_degrees(curve.largest_fitted()), missing.empty() ? "" : "; unknown and not in it: " + missing);
+                     to_degrees(curve.largest_fitted()), more);
 }
 
 std::string trend_of(const compensation::ThrustCurve& curve) {

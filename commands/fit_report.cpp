@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -9,7 +10,6 @@
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "commands/outputs.hpp"
-#include "compensation/file/plausibility.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/model/table_line.hpp"
@@ -80,6 +80,7 @@ struct FitRequest {
   std::vector<std::string> family;
   bool raw = false;
   bool no_report = false;
+  std::optional<double> fly_within_percent;
   bool accept = false;
   bool json = false;
 };
@@ -145,6 +146,13 @@ AnalysisOptions analysis_options(const FitRequest& request, const FitInput& inpu
                                  const Identification& identification) {
   AnalysisOptions options = commands::analysis_options(input, identification);
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
+  if (const auto& percent = request.fly_within_percent) {
+    if (!(*percent > 0 && *percent <= 100))
+      throw ConfigurationError(
+          fmt::format("--fly-within {}: expected a share of the thrust above 0, in percent", *percent));
+    options.limits.fit_to_fly = *percent / 100;
+    options.limits.with_care = std::max(options.limits.with_care, options.limits.fit_to_fly);
+  }
   return options;
 }
 
@@ -259,14 +267,6 @@ ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, cons
   return ExitCode::ok;
 }
 
-std::vector<std::string> doubts_of(const Identification& identification) {
-  std::vector<double> angles;
-  for (const OcclusionCoefficient& row : identification.table) angles.push_back(row.phi_deg);
-  const auto air = identification.air ? std::optional(identification.air->value) : std::nullopt;
-  return compensation::doubts_of(ThrustCoefficient(identification.curve_fit.K_T), identification.diameter_in, air,
-                                 angles);
-}
-
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
   if (!input.table.empty())
@@ -295,7 +295,6 @@ ExitCode run_fit(const FitRequest& request) {
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);
   print_findings(request, input, fitted, file);
-  print_doubts(file.string(), doubts_of(identification));
   if (input.provenance.origin != Origin::measured)
     fmt::print(stderr, "origin        {}\n",
                input.provenance.origin == Origin::simulated ? "SIMULATED, no propeller turned" : "unknown");
@@ -419,6 +418,8 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
   command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
   command.add_flag("--no-report", request.no_report, "write coefficients only");
+  command.add_option("--fly-within", request.fly_within_percent,
+                     "error of the thrust, percent, up to which the result is fit to fly (default 3; with care to 10)");
   command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
   command.add_flag("--json", request.json, "print the result as JSON");
 }

@@ -100,7 +100,7 @@ FitInput campaign_input(const fs::path& path) {
   }
   FitInput input;
   input.folder = path;
-  input.campaign = true;
+  input.campaign = input.mounted_once = true;
   input.steps = results::read_steps(folder.steps());
   input.provenance.source = "steps.csv of the campaign folder";
   const std::string serial = take_runs(folder, input.provenance);
@@ -137,6 +137,10 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   } else {
     input.steps = results::parse_steps(text, path.string());
     input.provenance.origin = results::origin_of(input.steps);
+    // A log does not tell whether anything was mounted anew; a campaign's own table, which its campaign does.
+    const fs::path campaign = input.folder / "campaign.yaml";
+    input.mounted_once =
+        !fs::is_regular_file(campaign) || !profiles::load_campaign(campaign.string()).order.remount_each_repetition;
   }
   return input;
 }
@@ -179,7 +183,7 @@ FittedFolder fitted_again(const std::string& folder) {
   const bool alone = !input.steps.empty() &&
                      std::ranges::all_of(input.steps, [](const auto& step) { return step.occlusion_deg == 0; });
   if (alone && !fs::exists(fs::path(folder) / "coefficients.yaml")) {
-    Identification K_T = identify(input.steps);
+    Identification K_T = identify(input.steps, {.mounted_once = input.mounted_once});
     Analysis analysis = analyse(K_T, analysis_options(input, K_T));
     return {std::move(input), {std::move(K_T), std::move(analysis)}};
   }
@@ -190,6 +194,7 @@ FittedFolder fitted_again(const std::string& folder) {
   const RecordedFit record = read_recorded_fit(file.string());
   Identification identification = identify(input.steps, record.options);
   AnalysisOptions options = analysis_options(input, identification);
+  options.limits = record.limits;
   if (record.bench) {
     const BenchUncertainty found = std::exchange(options.bench, *record.bench);
     // The file has the number alone.

@@ -150,6 +150,8 @@ SimulatedStand read_stand(const ProfileReader& file) {
   stand.slow_noise_n = file.get_or(at + "/slow_noise_n", stand.slow_noise_n);
   stand.slow_noise_s = file.get_or(at + "/slow_noise_s", stand.slow_noise_s);
   stand.cell_gain = file.get_or(at + "/cell_gain", stand.cell_gain);
+  stand.cell_gain_scatter = file.get_or(at + "/cell_gain_scatter", stand.cell_gain_scatter);
+  stand.clock_scatter = file.get_or(at + "/clock_scatter", stand.clock_scatter);
   stand.cell_hysteresis = file.get_or(at + "/cell_hysteresis", stand.cell_hysteresis);
   for (std::size_t i = 0; file.has(fmt::format("{}/plates/{}", at, i)); ++i) {
     const std::string plate = fmt::format("{}/plates/{}/", at, i);

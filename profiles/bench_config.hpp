@@ -76,6 +76,7 @@ struct SimulatedStand {
   std::optional<double> zero_walk_n;  ///< after one minute
   double slow_noise_n = 0, slow_noise_s = 1;
   double cell_gain = 1, cell_hysteresis = 0;
+  double cell_gain_scatter = 0, clock_scatter = 0;  ///< standard deviations from stand to stand, drawn from the seed
   std::vector<Plate> plates;
 };
 

@@ -89,7 +89,7 @@ ServerSettings settings_of(const profiles::BenchConfig& bench, const SimRequest&
   if (std::ranges::any_of(settings.bench.faults, [](const Fault& f) { return on_air_sensor(f.kind); }))
     refuse(bench.simulation->faults, "faults of the air sensor need a bench with `simulation.in_process`");
   settings.bench.time_scale = bench.simulation->time_scale;
-  settings.bench.oscillator_gain = options.clock_gain;
+  settings.bench.oscillator_gain += options.clock_gain;
   settings.bench.module.quirks = options.legacy ? kLegacyFirmware : IqQuirks{};
   settings.bench.module.reply_latency = from_seconds(1e-6 * options.reply_latency_us);
   settings.bench.motor_line_paced = options.paced;

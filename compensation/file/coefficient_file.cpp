@@ -405,7 +405,14 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   if (top.find("uncertainty")) {
     const Value uncertainty = top.map_at("uncertainty");
     for (const Value& source : uncertainty.list("not_known")) coefficients.not_known.push_back(source.text());
+    if (uncertainty.find("assumed"))
+      for (const Value& source : uncertainty.list("assumed")) coefficients.assumed.push_back(source.text());
     coefficients.verdict = uncertainty.text_at("verdict");
+    if (uncertainty.find("thrust_error")) {
+      const Value error = uncertainty.map_at("thrust_error");
+      coefficients.thrust_error = {error.number_at("share_95"), error.number_at("phi_deg"),
+                                   error.number_at("fit_to_fly"), error.number_at("with_care")};
+    }
   }
   return coefficients;
 }

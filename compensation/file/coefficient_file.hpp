@@ -74,6 +74,10 @@ struct Coefficients {
     Fit fit;
     std::vector<Run> runs;
   };
+  /// Of the thrust that flies, share, 95 %; where it is worst; up to which it is fit to fly, or to fly with care.
+  struct ThrustError {
+    std::optional<double> share_95, phi_deg, fit_to_fly, with_care;
+  };
   std::string path;
   std::string origin;  ///< measured, simulated; empty: not told
   std::string measured_utc;
@@ -86,11 +90,13 @@ struct Coefficients {
   std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
   std::vector<Parameter> parameters;              ///< of the curve
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
-  std::string verdict;                            ///< of the fit: fit_to_fly, with_care, not_yet; empty: not told
-  bool anchored = false;                          ///< k(0) of the curve is K_T
-  std::vector<Radians> points;                    ///< occlusions behind the curve
-  Radians smallest_occlusion;                     ///< of the valid range of φ
-  std::optional<RadPerSec> slowest_speed;         ///< valid range of speeds
+  std::vector<std::string> assumed;               ///< sources in them that nobody measured
+  ThrustError thrust_error;
+  std::string verdict;                     ///< of the fit: fit_to_fly, with_care, not_yet; empty: not told
+  bool anchored = false;                   ///< k(0) of the curve is K_T
+  std::vector<Radians> points;             ///< occlusions behind the curve
+  Radians smallest_occlusion;              ///< of the valid range of φ
+  std::optional<RadPerSec> slowest_speed;  ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
   std::vector<Torque> torque;  ///< ascending φ; empty if it was not measured

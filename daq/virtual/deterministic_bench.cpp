@@ -21,9 +21,17 @@ constexpr Duration kWorkEvery = std::chrono::milliseconds(5);
 constexpr Duration kHttpTimeout = std::chrono::seconds(5);
 constexpr Duration kMotorWait = std::chrono::milliseconds(1);
 constexpr sim::Peer kHost = 1;
+constexpr std::uint64_t kStandStream = 0x5851f42d'4c957f2dull;
 
 /// Neighbouring keys give unrelated streams.
 std::uint64_t mixed(std::uint64_t key) noexcept { return SplitMix64(key)(); }
+
+/// What this stand has and the next one, of another seed, has not: gain of its cell, clock of its motor.
+void take_scatter(const profiles::SimulatedStand& stand, std::uint64_t seed, sim::BenchSettings& settings) {
+  Random random(mixed(seed ^ kStandStream));
+  settings.plant.load_cell.gain *= 1 + stand.cell_gain_scatter * random.normal();
+  settings.oscillator_gain += stand.clock_scatter * random.normal();
+}
 
 /// Of one repetition; 0: of all. `plant` has the law of the nominal propellers.
 void take_stand(const profiles::SimulatedStand& stand, int repetition, sim::PlantParameters& plant) {
@@ -63,6 +71,7 @@ sim::BenchSettings simulated_devices(const profiles::BenchConfig& config, sim::B
   settings.plant.air_density_kg_m3 = config.simulation->air_density_kg_m3;
   take_stand(config.simulation->stand, repetition, settings.plant);
   settings.plant.stand.spin = config.iq.spin;
+  take_scatter(config.simulation->stand, config.simulation->seed, settings);
   const std::string &faults = config.simulation->faults, &motor = config.simulation->motor;
   if (!faults.empty()) sim::load_faults(profiles::read_text(faults), faults, settings);
   if (!motor.empty()) {

@@ -196,9 +196,18 @@ std::string analysis_blocks(const Analysis& analysis) {
                       matrix(analysis.covariance));
   text += fmt::format("  not_known: [{}]  # sources missing in the sums\n",
                       fmt::join(analysis.coefficients.front().not_known(), ", "));
+  text += fmt::format("  assumed: [{}]  # sources in the sums that nobody measured\n",
+                      fmt::join(analysis.coefficients.front().assumed(), ", "));
+  const FlightReadiness& flight = analysis.flight;
+  text += fmt::format(
+      "  thrust_error: {{share_95: {}, phi_deg: {}, fit_to_fly: {}, with_care: {}}}  # of the thrust that flies, where "
+      "it is "
+      "worst\n",
+      number(flight.error.share), number(flight.error.phi_deg), number(flight.limits.fit_to_fly),
+      number(flight.limits.with_care));
   std::vector<std::string> doubts;
-  for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(quoted(doubt.text));
-  text += fmt::format("  verdict: {}\n  doubts: [{}]\n", name_of(analysis.flight.readiness()), fmt::join(doubts, ", "));
+  for (const Doubt& doubt : flight.doubts) doubts.push_back(quoted(doubt.text));
+  text += fmt::format("  verdict: {}\n  doubts: [{}]\n", name_of(flight.readiness()), fmt::join(doubts, ", "));
   text += fmt::format(
       "  curve: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}, lack_of_fit_p: {}, quadratic_p: {}}}\n",
       number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
@@ -278,6 +287,8 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.weighting = named(fit.weights, "weights", path,
                             std::array{Weighting::equal, Weighting::thrust, Weighting::effective_variance});
   options.mounted_once = fit.mounted_once;
+  record.limits = {file.thrust_error.fit_to_fly.value_or(record.limits.fit_to_fly),
+                   file.thrust_error.with_care.value_or(record.limits.with_care)};
   options.loss = named(fit.loss, "loss", path, std::array{Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
   for (const std::string& run : fit.leave_out) options.left_out.push_back(parse_left_out_run(run));
   if (!fit.bench) return record;

@@ -62,6 +62,7 @@ struct Provenance {
 struct RecordedFit {
   IdentificationOptions options;
   std::optional<BenchUncertainty> bench;  ///< nullopt: the file does not say
+  ReadinessLimits limits;
 };
 
 /// Throws compensation::CoefficientError for a file that cannot be read, ConfigurationError for an unknown word.

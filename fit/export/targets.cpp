@@ -90,9 +90,10 @@ std::string one_line(std::string text) {
 /// "± 2.1e-09 (95 %, GUM; without calibration, which is unknown)".
 std::string uncertainty_words(const compensation::Coefficients& file) {
   if (!file.thrust_coefficient) return "uncertainty unknown";
-  const std::string missing =
-      file.not_known.empty() ? "" : fmt::format("; unknown and not in it: {}", fmt::join(file.not_known, ", "));
-  return fmt::format("± {:.2g} (95 %, GUM{})", file.thrust_coefficient->expanded_95, one_line(missing));
+  std::string more;
+  if (!file.assumed.empty()) more += fmt::format("; assumed in it: {}", fmt::join(file.assumed, ", "));
+  if (!file.not_known.empty()) more += fmt::format("; unknown and not in it: {}", fmt::join(file.not_known, ", "));
+  return fmt::format("± {:.2g} (95 %, GUM{})", file.thrust_coefficient->expanded_95, one_line(more));
 }
 
 bool is_simulated(const compensation::Coefficients& file) { return origin_named(file.origin) == Origin::simulated; }
@@ -268,7 +269,10 @@ std::string origin_words(const compensation::Coefficients& file) {
 
 std::string verdict_words(const compensation::Coefficients& file) {
   const auto readiness = readiness_named(file.verdict);
-  return readiness ? words(*readiness) : "unknown";
+  if (!readiness) return "unknown";
+  const auto& share = file.thrust_error.share_95;
+  return fmt::format("{}{}", words(*readiness),
+                     share ? fmt::format(", thrust within {} % (95 %)", two_digits(100 * *share)) : "");
 }
 
 std::vector<Turn> parse_turns(const std::string& text) {

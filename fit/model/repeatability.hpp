@@ -14,6 +14,11 @@
 
 namespace kphi::fit {
 
+/// From mounting to mounting, share of k, standard: assumed where nobody measured it.
+inline constexpr double kAssumedMounting = 0.005;
+inline constexpr const char* kWhyMounting = "two mountings of one set-up differ by 1 % in careful laboratories";
+inline constexpr const char* kRemount = "mount each repetition anew (remount_each_repetition)";
+
 struct RunSums {
   double phi_deg = 0;
   int repetition = 0;
@@ -58,9 +63,10 @@ struct Repeatability {
   std::vector<AngleScatter> angles;
   Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
   bool repeated = false;  ///< at least one φ was measured more than once
-  bool between_known = false;        ///< from repetitions, or given
+  bool between_known = false;        ///< from repetitions, given or assumed
   bool mounted_once = false;         ///< for all repetitions of a φ: `between` does not hold the mounting
-  std::optional<double> mounting{};  ///< then: standard deviation of k from mounting to mounting, as a share, if given
+  std::optional<double> mounting{};  ///< then: standard deviation of k from mounting to mounting, as a share
+  bool mounting_assumed = false;     ///< nobody gave it
   Estimate zero_movement{};          ///< of a run's zero, usually, N; freedom: the runs behind it
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².

@@ -219,7 +219,8 @@ Json to_json(const Choice& choice) {
                     {"u", budget.combined()},
                     {"freedom", budget.freedom()},
                     {"limited_by", row == nullptr ? Json(nullptr) : Json(row->source)},
-                    {"not_known", budget.not_known()}});
+                    {"not_known", budget.not_known()},
+                    {"assumed", budget.assumed()}});
   }
   const auto& until = one.profile.until;
   return {{"minutes", choice.minutes()},
@@ -302,9 +303,9 @@ std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) 
   for (std::size_t i = 0; i < answer.told.size(); ++i)
     text +=
         fmt::format("{:<5} as written is limited by {}\n", answer.told[i].name(), row_words(answer.as_written.told[i]));
-  std::set<std::string> unknown;
-  for (const std::string& name : answer.as_written.told.front().not_known()) unknown.insert(name);
-  if (!unknown.empty()) text += fmt::format("unknown and not in it: {} (see --u)\n", fmt::join(unknown, ", "));
+  const std::vector<std::string> assumed = answer.as_written.told.front().assumed();
+  if (!assumed.empty())
+    text += fmt::format("assumed in ±, since not measured: {} (see --u)\n", fmt::join(assumed, ", "));
   for (const Unreachable& one : answer.unreachable)
     text +=
         fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n", one.wish.of.name(),

@@ -170,7 +170,8 @@ Standing reached_so_far(std::span<const results::StepMean> steps, const profiles
     IdentificationOptions options;
     options.mounted_once = !campaign.order.remount_each_repetition;
     options.mounting = bench.mounting;
-    AnalysisOptions asked{.bench = bench};
+    AnalysisOptions asked;
+    asked.bench = bench;
     for (const Wish& wish : wishes) asked.prediction_deg.push_back(wish.of.phi_deg);
     Identification identification = identify(steps, options);
     Analysis analysis = analyse(identification, asked);

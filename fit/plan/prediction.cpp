@@ -64,7 +64,7 @@ RunToCome run_to_come(const profiles::Campaign& campaign, const StandNoise& nois
 /// Scatter from run to run as this campaign shows it, and what one mounting for all its runs hides.
 void take_scatter(const profiles::Campaign& campaign, const StandNoise& noise, Repeatability& all) {
   const bool remounts = campaign.order.remount_each_repetition;
-  const double u = remounts ? std::hypot(noise.runs, noise.mounting.value_or(0)) : noise.runs;
+  const double u = remounts ? std::hypot(noise.runs, noise.mounting.value_or(kAssumedMounting)) : noise.runs;
   all.repeated = campaign.repetitions > 1;
   all.between_known = true;
   std::vector<std::vector<results::RunShare>> shares;
@@ -75,7 +75,9 @@ void take_scatter(const profiles::Campaign& campaign, const StandNoise& noise, R
   }
   all.between = {0, u, all.repeated ? std::max(1.0, results::freedom_of(u * u, shares)) : noise.runs_freedom};
   all.mounted_once = !remounts;
-  if (!remounts) all.mounting = noise.mounting;
+  if (remounts) return;
+  all.mounting = noise.mounting.value_or(kAssumedMounting);
+  all.mounting_assumed = !noise.mounting;
 }
 
 const CurveOptions kLine{};

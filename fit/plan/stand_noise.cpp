@@ -256,7 +256,8 @@ void take_runs(std::span<const PilotCampaign> pilots, StandNoise& noise) {
   noise.runs_freedom = results::freedom_of(variance, shares);
   if (pilots.front().mounted_once) {
     noise.runs = std::sqrt(variance);
-    noise.mounting = pilots.front().fitted.identification.repeatability.mounting;
+    const Repeatability& first = pilots.front().fitted.identification.repeatability;
+    if (!first.mounting_assumed) noise.mounting = first.mounting;
   } else {
     noise.mounting = std::sqrt(variance);  // with what a run adds: the two cannot be told apart
   }

@@ -29,7 +29,7 @@ struct StandNoise {
   double zero_walk_n = 0;  ///< how far the zero moves in a minute, standard deviation, N
   double runs = 0;         ///< from run to run beyond noise and zero, standard deviation, share of k
   double runs_freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind `runs`
-  std::optional<double> mounting{};  ///< from mounting to mounting, share of k; nullopt: unknown
+  std::optional<double> mounting{};  ///< from mounting to mounting, share of k; nullopt: not measured
   double campaigns = 0;              ///< from campaign to campaign, common to all k, share
   double model = 0;                  ///< how far k at some speed is from the k of the fit, share
   double bend = 0;                   ///< how far k(φ) is from the curve, standard deviation, share of K_T

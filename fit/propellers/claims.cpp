@@ -99,8 +99,17 @@ Claim linear(const Fitted& member) {
   return claim;
 }
 
+/// The errors that all k of a campaign share cancel in it.
 std::optional<Estimate> share_of_thrust(const Fitted* member, double phi_deg) {
-  return ratio(k_of(member, phi_deg, Air::measured), k_of(member, 0, Air::measured));
+  const auto own = [&](double phi) -> std::optional<Estimate> {
+    const auto whole = k_of(member, phi, Air::measured);
+    if (!whole) return whole;
+    const auto row = std::ranges::find(member->identification.table, phi, &OcclusionCoefficient::phi_deg);
+    Budget budget = member->analysis.coefficients[static_cast<std::size_t>(row - member->identification.table.begin())];
+    std::erase_if(budget.rows, &BudgetRow::common);
+    return budget.estimate();
+  };
+  return ratio(own(phi_deg), own(0));
 }
 
 /// The smallest lead over the φ in the share of thrust that three blades keep more than two.

@@ -38,7 +38,7 @@ static void to_json(Json& json, const Budget& budget) {
     Json& one = rows.emplace_back(Json{{"type", row.evaluation == Evaluation::type_a ? "A" : "B"},
                                        {"contribution", row.known() ? row.contribution() : kUnknown},
                                        {"share", budget.share(row)}});
-    KPHI_JSON_MEMBERS(one, row, source, u, unit, sensitivity, freedom, common, note);
+    KPHI_JSON_MEMBERS(one, row, source, u, unit, sensitivity, freedom, common, assumed, note);
   }
   KPHI_JSON_MEMBERS(json, budget, quantity, unit, value);
   json.update({{"u", budget.combined()},
@@ -68,6 +68,13 @@ static void to_json(Json& json, const CurvePrediction& one) {
 static void to_json(Json& json, const TorqueCoefficient& one) {
   json = {{"k_q_nm_per_rad2_s2", one.k_q}, {"u_share", one.share_u}};
   KPHI_JSON_MEMBERS(json, one, phi_deg, share, drag_per_thrust_m);
+}
+
+static void to_json(Json& json, const ThrustErrorPart& part) { KPHI_JSON_MEMBERS(json, part, name, share, remedy); }
+
+static void to_json(Json& json, const ThrustError& error) {
+  json["share_95"] = error.share;
+  KPHI_JSON_MEMBERS(json, error, phi_deg, parts);
 }
 
 static void to_json(Json& json, const OutlyingRun& run) { KPHI_JSON_MEMBERS(json, run, phi_deg, repetition, share, p); }
@@ -153,12 +160,14 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
   for (const Doubt& doubt : analysis.flight.doubts) doubts.push_back(doubt.text);
   return {{"coefficients", coefficients.empty() ? Json() : Json(coefficients.string())},
           {"verdict", name_of(analysis.flight.readiness())},
+          {"thrust_error", analysis.flight.error},
           {"doubts", doubts},
           {"k_unit", "N/(rad/s)^2"},
           {"K_T", K_T.value},
           {"K_T_u", K_T.combined()},
           {"K_T_expanded_95", K_T.expanded()},
           {"not_known", K_T.not_known()},
+          {"assumed", K_T.assumed()},
           {"k_standard", analysis.standard.empty() ? kUnknown : analysis.standard.front().value},
           {"air_density_kg_m3", identification.air ? identification.air->value : kUnknown},
           {"curve", curve},
@@ -177,14 +186,17 @@ std::string plus_minus_words(const Budget& budget) {
   if (!(budget.combined() > 0))
     return "no u of k was given: that of each k is unknown; ± of the curve, if any, is 95 % by the scatter of its "
            "points";
-  if (missing.empty()) return "± is 95 % by the GUM";
-  return fmt::format("± is 95 % by the GUM; unknown and not in it: {} (see --u)", fmt::join(missing, ", "));
+  const std::vector<std::string> assumed = budget.assumed();
+  std::string text = "± is 95 % by the GUM";
+  if (!assumed.empty()) text += fmt::format("; assumed in it, since not measured: {}", fmt::join(assumed, ", "));
+  if (!missing.empty()) text += fmt::format("; unknown and not in it: {}", fmt::join(missing, ", "));
+  return text + (assumed.empty() && missing.empty() ? "" : " (see --u)");
 }
 
 std::string headline_text(const Fitted& fitted) {
   const auto& [identification, analysis] = fitted;
   const Budget& K_T = analysis.coefficients.front();
-  std::string text = fmt::format("{:<10} {}\n", "verdict", words(analysis.flight.readiness()));
+  std::string text = fmt::format("{:<10} {}\n", "verdict", verdict_line(analysis.flight));
   for (const Doubt& doubt : analysis.flight.doubts) text += fmt::format("{:<10} {}\n", "", doubt.text);
   text += number_line("K_T", K_T);
   for (std::size_t i = 0; i < analysis.parameters.size(); ++i)
@@ -197,9 +209,19 @@ std::string headline_text(const Fitted& fitted) {
 
 std::string caution_text(const Identification& identification, const Analysis& analysis) {
   std::string text;
-  for (const FlaggedStep& flagged : identification.selection.flagged) {
-    text += fmt::format("{:<13} phi {}°, repetition {}, step {}: {}\n", flagged.left_out ? "left out" : "kept",
-                        flagged.step.occlusion_deg, flagged.step.repetition, flagged.step.step + 1, flagged.reason);
+  const auto alike = [](const FlaggedStep& a, const FlaggedStep& b) {
+    return a.left_out == b.left_out && a.reason == b.reason && a.step.occlusion_deg == b.step.occlusion_deg &&
+           a.step.repetition == b.step.repetition && b.step.step == a.step.step + 1;
+  };
+  const std::vector<FlaggedStep>& all = identification.selection.flagged;
+  for (auto first = all.begin(); first != all.end();) {
+    auto last = first;
+    while (last + 1 != all.end() && alike(*last, *(last + 1))) ++last;
+    const std::string steps = first == last ? fmt::format("step {}", first->step.step + 1)
+                                            : fmt::format("steps {} to {}", first->step.step + 1, last->step.step + 1);
+    text += fmt::format("{:<13} phi {}°, repetition {}, {}: {}\n", first->left_out ? "left out" : "kept",
+                        first->step.occlusion_deg, first->step.repetition, steps, first->reason);
+    first = last + 1;
   }
   for (const RejectedPoint& point : analysis.rejected) {
     text += fmt::format("rejected      phi {}°, repetition {}, step {}: {:+.3f} N off, robust weight {:.2f}\n",

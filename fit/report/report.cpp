@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <iterator>
 
@@ -24,9 +25,12 @@ std::string verdict_box(const FlightReadiness& flight) {
   std::string html =
       fmt::format("<div class=\"verdict {}\"><h3>{}</h3>\n", name_of(flight.readiness()),
                   !flight.has_curve ? "K<sub>T</sub> alone: no occlusion was measured, so there is no k(φ) to fly with"
-                  : flight.doubts.empty() ? "Fit to fly: each test of the model that could be made passed"
-                  : flight.readiness() == Readiness::not_yet ? "Do not fly yet"
-                                                             : "Fly with care");
+                  : flight.readiness() == Readiness::fit_to_fly ? "Fit to fly"
+                  : flight.readiness() == Readiness::not_yet    ? "Do not fly yet"
+                                                                : "Fly with care");
+  std::string number = words(flight.error);
+  number.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(number.front())));
+  html += "<p><b>" + typeset(number) + ".</b></p>\n";
   for (const Doubt& doubt : flight.doubts) html += "<p>" + typeset(doubt.text) + "</p>\n";
   return html + "</div>\n";
 }

@@ -19,9 +19,9 @@ std::vector<double> unit_vector(std::size_t n, std::size_t i) {
 
 std::string name_of_k(double phi_deg) { return phi_deg == 0 ? "K_T" : fmt::format("k({} deg)", phi_deg); }
 
-ErrorSources sources_of(const Identification& identification, const Analysis& analysis, const BenchUncertainty& bench) {
-  if (!identification.repeatability.angles.empty())
-    return error_sources(identification.repeatability, analysis.speed, bench);
+ErrorSources sources_of(const Identification& identification, std::span<const SpeedDependence> speed,
+                        const BenchUncertainty& bench) {
+  if (!identification.repeatability.angles.empty()) return error_sources(identification.repeatability, speed, bench);
   std::vector<double> k, errors;
   for (const OcclusionCoefficient& row : identification.table) {
     k.push_back(row.k);
@@ -192,6 +192,12 @@ std::vector<std::string> remarks_of(const Identification& identification, const 
   for (std::string& remark :
        identification.curve_fit.remarks(analysis.shape.mismatch, identification.table.back().phi_deg))
     remarks.push_back(std::move(remark));
+  if (const auto& floor = analysis.flight.error.carries_to_deg)
+    remarks.push_back(
+        fmt::format("from {:.0f}° on a rotor keeps less than a tenth of its thrust: nothing flies on it there, and the "
+                    "verdict is for "
+                    "the angles below",
+                    *floor));
   return remarks;
 }
 
@@ -278,7 +284,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   const bool from_steps = !identification.repeatability.angles.empty();
   if (from_steps) analysis.speed = speed_dependence(identification.table, identification.repeatability.zero_movement);
   analysis.trend = speed_trend(identification, analysis.speed);
-  const ErrorSources sources = sources_of(identification, analysis, options.bench);
+  const ErrorSources sources = sources_of(identification, analysis.speed, options.bench);
   for (std::size_t i = 0; i < phis.size(); ++i)
     analysis.coefficients.push_back(
         sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
@@ -288,8 +294,11 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.differences = neighbour_tests(analysis.coefficients, sources, identification);
   analysis.between_runs = identification.repeatability.between;
   analysis.outlying = outlying_runs(identification.selection.used);
-  analysis.flight = flight_readiness(identification, {analysis.speed, analysis.curvature, analysis.outlying,
-                                                      analysis.differences, analysis.trend.has_value()});
+  analysis.flight =
+      flight_readiness(identification,
+                       {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences, analysis.trend,
+                        sources_of(identification, {}, options.bench), options.bench.air_density},
+                       options.limits);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
   std::vector<Estimate> k;

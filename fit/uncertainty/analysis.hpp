@@ -18,6 +18,7 @@ namespace kphi::fit {
 
 struct AnalysisOptions {
   BenchUncertainty bench;
+  ReadinessLimits limits;
   std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 135, 150, 180, 210, 240, 270};
 };
 

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "base/csv.hpp"
@@ -13,23 +14,32 @@
 namespace kphi::fit {
 namespace {
 
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kEndless = std::numeric_limits<double>::infinity();
+/// Share of a variance that rounding leaves of errors that cancel.
+constexpr double kVanishing = 1e-12;
+
 struct Entry {
   const char* name;
   std::optional<double> BenchUncertainty::*member;
   double unit;
+  double assumed = kUnknown;  ///< where nobody measured it, in `unit`
+  const char* why = "";       ///< that much
+  const char* remedy = "";
 };
 
 constexpr std::array<Entry, 6> kEntries{{
-    {"calibration", &BenchUncertainty::cell_calibration, 1},
-    {"cross-axis", &BenchUncertainty::cross_axis, 1},
-    {"alignment-deg", &BenchUncertainty::alignment_rad, kPi / 180},
-    {"clock", &BenchUncertainty::motor_clock, 1},
+    {"calibration", &BenchUncertainty::cell_calibration, 1, 0.006, "slopes of loading and unloading differ by 1 %",
+     "weigh the load cell (kphi weigh)"},
+    {"cross-axis", &BenchUncertainty::cross_axis, 1, 0.002, "data sheets of six-axis cells, with side loads as large",
+     "give it (--u cross-axis=VALUE)"},
+    {"alignment-deg", &BenchUncertainty::alignment_rad, kPi / 180, 2, "set up by eye",
+     "give it (--u alignment-deg=DEG)"},
+    {"clock", &BenchUncertainty::motor_clock, 1, 0.002, "a motor module without a crystal",
+     "measure the motor's clock (kphi devices --clock-gain)"},
     {"density", &BenchUncertainty::air_density, 1},
-    {"mounting", &BenchUncertainty::mounting, 1},
+    {"mounting", &BenchUncertainty::mounting, 1, kAssumedMounting, kWhyMounting, kRemount},
 }};
-
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 /// Of Σ weights · k. Its u is the root mean square over the φ with a weight, the column "u" in a budget of several k.
 BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {
@@ -51,36 +61,47 @@ BudgetRow row_of(const ErrorSource& source, std::span<const double> weights) {
                 : spread > 0                ? squares * squares / spread
                                             : kEndless;
   row.common = source.common;
+  row.assumed = source.assumed;
   row.note = source.note;
+  row.remedy = source.remedy;
   return row;
 }
 
-/// A relative error common to all measurements of the bench. k follows it to the power `power`; the user gives it with
-/// --u `option`.
-void add_common(ErrorSources& sources, const char* name, const char* option, const std::optional<double>& u,
-                double power, const char* unit = "1", const char* note = "") {
-  const std::string words = u ? note : fmt::format("unknown; give it with --u {}=VALUE", option);
-  ErrorSource source{name, Evaluation::type_b, unit, words, true};
-  for (const double k : sources.k) source.effects.push_back({u.value_or(kUnknown), power * k});
+/// An error common to all measurements of the bench, as `bench` has it, or as assumed. `sensitivity` of k, relative,
+/// per its unit at its value.
+void add_common(ErrorSources& sources, const char* name, const BenchUncertainty& bench,
+                std::optional<double> BenchUncertainty::*member, const char* unit,
+                const std::function<double(double)>& sensitivity, const std::string& note = "") {
+  const Entry& entry = *std::ranges::find(kEntries, member, &Entry::member);
+  const bool known = (bench.*member).has_value();
+  const double u = known ? *(bench.*member) : entry.assumed * entry.unit;
+  ErrorSource source{name, Evaluation::type_b, unit, known ? note : fmt::format("assumed: {}", entry.why), true, !known,
+                     0,    entry.remedy};
+  for (const double k : sources.k) source.effects.push_back({u, sensitivity(u) * k});
   sources.sources.push_back(std::move(source));
 }
 
 void add_bench(ErrorSources& sources, const BenchUncertainty& bench) {
-  add_common(sources, "cell calibration", "calibration", bench.cell_calibration, 1, "1",
-             bench.calibration_note.c_str());
-  add_common(sources, "cross-axis", "cross-axis", bench.cross_axis, 1);
+  const auto as_k = [](double) { return 1.0; };
+  add_common(sources, "cell calibration", bench, &BenchUncertainty::cell_calibration, "1", as_k,
+             bench.calibration_note);
+  add_common(sources, "cross-axis", bench, &BenchUncertainty::cross_axis, "1", as_k);
   // cos α = 1 − α²/2: no first order. The standard deviation of α²/2 is u²/√2.
-  add_common(sources, "alignment", "alignment-deg", bench.alignment_rad,
-             bench.alignment_rad.value_or(0) / std::numbers::sqrt2, "rad", "second order");
-  add_common(sources, "motor clock", "clock", bench.motor_clock, -2);
+  add_common(
+      sources, "alignment", bench, &BenchUncertainty::alignment_rad, "rad",
+      [](double u) { return u / std::numbers::sqrt2; }, "second order");
+  add_common(sources, "motor clock", bench, &BenchUncertainty::motor_clock, "1", [](double) { return -2.0; });
 }
 
 /// Of plates that were mounted once for all their runs.
 ErrorSource mounting_of(const Repeatability& all) {
   ErrorSource mounting{"mounting", Evaluation::type_b, "1",
-                       all.mounting ? "as given: each occlusion was mounted once for all its runs"
-                                    : "unknown: each occlusion was mounted once for all its runs; remount it for each "
-                                      "(remount_each_repetition), or give it with --u mounting=VALUE"};
+                       all.mounting_assumed ? fmt::format("assumed, since each occlusion was mounted once for all its "
+                                                          "runs: {}",
+                                                          kWhyMounting)
+                                            : "as given: each occlusion was mounted once for all its runs"};
+  mounting.assumed = all.mounting_assumed;
+  mounting.remedy = kRemount;
   for (const AngleScatter& angle : all.angles) mounting.effects.push_back({all.mounting.value_or(kUnknown), angle.k});
   return mounting;
 }
@@ -92,9 +113,13 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
                    "of each run: as measured, and how far zeros usually move in a run"};
   zero.shared_freedom = all.zero_movement.value > 0 ? all.zero_movement.freedom : 0;
   between.shared_freedom = all.between.freedom;
-  between.note = all.repeated        ? "beyond noise and zero, pooled over phi"
-                 : all.between_known ? "one run each; as given for the mounting"
-                                     : "unknown: one run each; repeat, or give it with --u mounting=VALUE";
+  between.assumed = !all.repeated && all.mounting_assumed;
+  between.note = all.repeated      ? "beyond noise and zero, pooled over phi"
+                 : between.assumed ? fmt::format("assumed, since there is one run each: {}", kWhyMounting)
+                                   : "one run each; as given for the mounting";
+  noise.remedy = "measure more steps or longer ones";
+  between.remedy = all.repeated ? "repeat the campaign once more" : kRemount;
+  zero.remedy = "measure the zeros longer, and let the load cell warm up";
   for (const AngleScatter& angle : all.angles) {
     const double runs = static_cast<double>(angle.runs.size());
     noise.effects.push_back({angle.within_u(), 1, angle.within.freedom > 0 ? angle.within.freedom : kEndless});
@@ -138,6 +163,13 @@ std::vector<std::string> Budget::not_known() const {
   std::vector<std::string> names;
   for (const BudgetRow& row : rows)
     if (!row.known()) names.push_back(row.source);
+  return names;
+}
+
+std::vector<std::string> Budget::assumed() const {
+  std::vector<std::string> names;
+  for (const BudgetRow& row : rows)
+    if (row.assumed && share(row) > kVanishing) names.push_back(row.source);
   return names;
 }
 

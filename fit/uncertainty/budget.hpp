@@ -30,8 +30,10 @@ struct BudgetRow {
   std::string unit;        ///< "N", "1" (relative), …
   double sensitivity = 0;  ///< change of the result per `unit`
   double freedom = std::numeric_limits<double>::infinity();
-  bool common = false;  ///< the same error in every coefficient of the campaign: it cancels in ratios
-  std::string note{};   ///< where the number comes from; may be empty
+  bool common = false;   ///< the same error in every coefficient of the campaign: it cancels in ratios
+  bool assumed = false;  ///< nobody measured it: what stands usually have is in its place
+  std::string note{};    ///< where the number comes from; may be empty
+  std::string remedy{};  ///< what makes it smaller: "weigh the load cell (kphi weigh)"; may be empty
 
   [[nodiscard]] bool known() const { return u == u; }
   [[nodiscard]] double contribution() const;  ///< |sensitivity| u, unit of the result; 0 if unknown
@@ -50,11 +52,12 @@ struct Budget {
   [[nodiscard]] double expanded(double level = 0.95) const;  ///< half the interval
   [[nodiscard]] double share(const BudgetRow& row) const;    ///< of the variance, 0..1
   [[nodiscard]] std::vector<std::string> not_known() const;  ///< sources that are missing in the sum
+  [[nodiscard]] std::vector<std::string> assumed() const;    ///< sources in the sum that nobody measured
   [[nodiscard]] Estimate estimate() const { return {value, combined(), freedom()}; }
 };
 
-/// Standard uncertainties of the stand, which its steps do not show; from its calibration. nullopt: unknown, listed in
-/// the budget without a value and not taken as zero.
+/// Standard uncertainties of the stand, which its steps do not show; from its calibration. nullopt: nobody measured it.
+/// What every stand has is then assumed (README.md, "Assumed"); the density is listed without a value.
 struct BenchUncertainty {
   std::optional<double> cell_calibration;  ///< relative, of the load cell's sensitivity
   std::string calibration_note{};          ///< where that comes from, for the budget; may be empty
@@ -80,7 +83,9 @@ struct ErrorSource {
   std::string unit;
   std::string note{};
   bool common = false;        ///< the same error at every φ
+  bool assumed = false;       ///< see BudgetRow
   double shared_freedom = 0;  ///< one estimate behind all φ; 0: each its own
+  std::string remedy{};       ///< see BudgetRow
   struct Effect {
     double u = 0;            ///< in `unit`; NaN: unknown
     double sensitivity = 0;  ///< of k per `unit`

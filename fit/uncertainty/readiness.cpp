@@ -6,18 +6,18 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <optional>
 
 #include "base/number.hpp"
+#include "compensation/file/plausibility.hpp"
 #include "compensation/units.hpp"
+#include "fit/uncertainty/ideal_disk.hpp"
 
 namespace kphi::fit {
 namespace {
 
 constexpr std::array<std::string_view, 4> kNames{"fit_to_fly", "with_care", "not_yet", "no_curve"};
-
-/// A line that misses a measured k by more than this share of K_T does not give the thrust that was asked for.
-constexpr double kLargestMiss = 0.05;
 
 /// Less than this share of the thrust no flight notices, however surely a test sees it.
 constexpr double kNegligible = 0.001;
@@ -58,19 +58,13 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
         "k {} with speed, by {} at {}° from {:.0f} to {:.0f} RPM: near {:.0f} RPM the thrust is {} {} than k says; {}",
         change > 0 ? "rises" : "falls", in_percent(change), one.phi_deg, rpm(one.levels.front()),
         rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher",
-        tests.trend_flies ? "the flying library follows it (speed_trend); for a stack that cannot, fit the speeds of "
-                            "your flight alone (--speed-range-rpm)"
-                          : "fit the speeds of your flight alone (--speed-range-rpm)");
+        tests.trend ? "the flying library follows it (speed_trend); for a stack that cannot, fit the speeds of "
+                      "your flight alone (--speed-range-rpm)"
+                    : "fit the speeds of your flight alone (--speed-range-rpm)");
   }
   if (count == 0) return std::nullopt;
   clearest.p = std::min(1.0, count * clearest.p);
   return clearest;
-}
-
-/// There were more occlusions than the curve has numbers.
-bool is_tested(const Curvature& curvature) {
-  return !std::isnan(curvature.lack_of_fit.p) ||
-         (!curvature.quadratic.name.empty() && !std::isnan(curvature.quadratic.p));
 }
 
 std::optional<Suspicion> of_curve(const Identification& identification, const ModelTests& tests) {
@@ -87,13 +81,14 @@ std::optional<Suspicion> of_curve(const Identification& identification, const Mo
   const Repeatability& runs = identification.repeatability;
   return Suspicion{
       p,
-      {std::abs(miss) > kLargestMiss ? Readiness::not_yet : Readiness::with_care,
-       fmt::format(
-           "{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
-           "the plates and their angles{}{}",
-           fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above",
-           runs.mounted_once && !runs.mounting ? " (each was mounted once: a crooked mounting looks the same)" : "",
-           fit.model().remedy())}};
+      {Readiness::fit_to_fly,
+       fmt::format("{}: at {}° the measured k is {} of K_T {} it; expect the same error of thrust in flight, and check "
+                   "the plates and their angles{}{}",
+                   fit.model().denial(), fit.points[worst].phi_deg, in_percent(miss), miss < 0 ? "below" : "above",
+                   runs.mounted_once && runs.mounting_assumed
+                       ? " (each was mounted once: a crooked mounting looks the same)"
+                       : "",
+                   fit.model().remedy())}};
 }
 
 std::optional<Suspicion> of_runs(const ModelTests& tests) {
@@ -102,7 +97,7 @@ std::optional<Suspicion> of_runs(const ModelTests& tests) {
   if (worst == tests.outlying.end() || !(std::abs(worst->share) > kSmallStray)) return Suspicion{};
   if (std::isnan(worst->p)) return std::nullopt;
   return Suspicion{worst->p,
-                   {Readiness::with_care,
+                   {Readiness::fit_to_fly,
                     fmt::format("repetition {} at {}° is {} {} the others: look for a slipped plate or a loose screw, "
                                 "then repeat this occlusion, or leave the run out (--leave-out \"{}:{}:CAUSE\")",
                                 worst->repetition, worst->phi_deg, in_percent(worst->share),
@@ -125,10 +120,45 @@ std::vector<Doubt> of_order(const Identification& identification, const ModelTes
   return all;
 }
 
+/// Share by which K_T is low if a plate was left on at 0°: k hardly falls up to the first occlusion, where the
+/// occlusions beyond fall by much over as many degrees. 0: it does not look like one.
+double plate_at_zero(const Identification& identification, const ModelTests& tests) {
+  const auto& table = identification.table;
+  if (table.size() < 3 || tests.differences.empty()) return 0;
+  const double beyond = (table[1].k - table.back().k) / (table.back().phi_deg - table[1].phi_deg) * table[1].phi_deg;
+  const double fall = table[0].k - table[1].k, u = std::abs(fall / tests.differences.front().value);
+  const bool can_tell = std::isfinite(u) && beyond > 6 * u;
+  return can_tell && fall + 2 * u < beyond / 2 ? (beyond - fall) / table[0].k : 0;
+}
+
+std::optional<Doubt> of_untested_curve(const Identification& identification) {
+  constexpr std::size_t kLeastRows = 4;
+  if (identification.alone() || identification.table.size() >= kLeastRows) return std::nullopt;
+  return Doubt{Readiness::with_care,
+               fmt::format("k(φ) between the occlusions is not tested: of {} measured angles nobody knows which way it "
+                           "bends; measure another occlusion between them",
+                           identification.table.size())};
+}
+
+/// What no propeller and no stand does.
+std::vector<Doubt> impossible(const Identification& identification) {
+  std::vector<double> angles;
+  for (const OcclusionCoefficient& row : identification.table) angles.push_back(row.phi_deg);
+  const auto air = identification.air ? std::optional(identification.air->value) : std::nullopt;
+  std::vector<std::string> texts = compensation::doubts_of(ThrustCoefficient(identification.thrust_coefficient().value),
+                                                           identification.diameter_in, air, angles);
+  std::ranges::move(broken_laws_of_power(identification), std::back_inserter(texts));
+  std::vector<Doubt> doubts;
+  for (std::string& text : texts) doubts.push_back({Readiness::not_yet, std::move(text)});
+  return doubts;
+}
+
 }  // namespace
 
-FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests) {
-  FlightReadiness flight{of_order(identification, tests), !identification.alone()};
+FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests,
+                                 const ReadinessLimits& limits) {
+  FlightReadiness flight{
+      .doubts = of_order(identification, tests), .has_curve = !identification.alone(), .limits = limits};
   std::vector<Suspicion> all;
   for (const auto& one : {of_speed(identification, tests), of_curve(identification, tests), of_runs(tests)})
     if (one) all.push_back(*one);
@@ -137,25 +167,36 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
   const double level = holm_level(p);
   for (Suspicion& one : all)
     if (one.p < level) flight.doubts.push_back(std::move(one.doubt));
-  const bool from_steps = !identification.repeatability.angles.empty();
-  if (from_steps && !identification.repeatability.between_known)
-    flight.doubts.push_back({Readiness::with_care,
-                             "every occlusion was measured once: how much k changes from mounting to mounting is "
-                             "unknown, and not in the ±; repeat the campaign, or give it (--u mounting=VALUE)"});
-  if (!from_steps &&
+  if (identification.repeatability.angles.empty() &&
       std::ranges::any_of(identification.table, [](const auto& row) { return !(row.standard_error > 0); }))
     flight.doubts.push_back(
         {Readiness::with_care, "the table gives no u of k: how wrong a k may be is unknown; add its column u_k_…"});
-  if (flight.has_curve && !is_tested(tests.curvature))
+  if (auto doubt = of_untested_curve(identification)) flight.doubts.push_back(std::move(*doubt));
+  const double plate = plate_at_zero(identification, tests);
+  if (plate > 0)
     flight.doubts.push_back(
         {Readiness::with_care,
-         fmt::format("k(φ) between the occlusions is not tested: {} {} carry a {} of {} numbers; measure another "
-                     "occlusion between them",
-                     identification.curve_fit.points.size(),
-                     identification.curve_fit.points.size() == 1 ? "occlusion" : "occlusions",
-                     name_of(identification.curve_fit.form), identification.curve_fit.parameters.size())});
+         fmt::format("k hardly falls from 0° to {0}°, and by much beyond: if a plate was on at 0°, K_T is {1} too low; "
+                     "look, and repeat the runs at 0° (or {0}°, if its plate was missing)",
+                     identification.table[1].phi_deg, in_percent(plate))});
+  std::ranges::move(impossible(identification), std::back_inserter(flight.doubts));
   std::ranges::stable_sort(flight.doubts, std::greater{}, &Doubt::readiness);
+  flight.error = thrust_error(identification,
+                              {tests.sources, tests.speed, tests.trend, tests.outlying, tests.air_density_u, plate});
   return flight;
+}
+
+Readiness FlightReadiness::readiness() const {
+  const Readiness worst = doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
+  const Readiness by_number = error.share <= limits.fit_to_fly ? Readiness::fit_to_fly
+                              : error.share > limits.with_care ? Readiness::not_yet
+                                                               : Readiness::with_care;
+  if (!has_curve) return worst == Readiness::not_yet ? worst : Readiness::no_curve;
+  return std::max(worst, by_number);
+}
+
+std::string verdict_line(const FlightReadiness& flight) {
+  return fmt::format("{}: {}", words(flight.readiness()), words(flight.error));
 }
 
 const char* words(Readiness readiness) {

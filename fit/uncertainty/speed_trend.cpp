@@ -20,23 +20,24 @@ double speed_of_origin(const Identification& identification) {
   return fourth > 0 ? fifth / fourth : 0;
 }
 
-double reference_of(const Identification& identification) {
+}  // namespace
+
+double reference_speed(const Identification& identification) {
+  const double fastest = identification.fitted.max_rad_s;
   switch (identification.options.estimator) {
     case Estimator::through_origin:
-      return identification.options.weighting == Weighting::equal ? speed_of_origin(identification) : 0;
+      return identification.options.weighting == Weighting::equal ? speed_of_origin(identification) : fastest;
     case Estimator::polynomial:
     case Estimator::at_speed:
       return identification.at_speed_rad_s;
     case Estimator::with_offset:
       break;
   }
-  return 0;
+  return fastest;
 }
 
-}  // namespace
-
-std::optional<SpeedTrend> speed_trend(const Identification& identification, std::span<const SpeedDependence> speed) {
-  SpeedTrend trend{.per_rad_s = {}, .reference_rad_s = reference_of(identification)};
+std::optional<Estimate> common_trend(std::span<const SpeedDependence> speed) {
+  Estimate trend;
   double weight = 0, squares = 0, freedom = 0, count = 0;
   std::vector<Estimate> each;
   for (const SpeedDependence& one : speed) {
@@ -47,19 +48,30 @@ std::optional<SpeedTrend> speed_trend(const Identification& identification, std:
   for (const Estimate& one : each) {
     const double share = 1 / (one.u * one.u);
     weight += share;
-    trend.per_rad_s.value += share * one.value;
+    trend.value += share * one.value;
     freedom += std::isfinite(one.freedom) ? one.freedom : 0;
     ++count;
   }
-  if (count == 0 || !(trend.reference_rad_s > 0)) return std::nullopt;
-  trend.per_rad_s.value /= weight;
-  for (const Estimate& one : each) squares += std::pow((one.value - trend.per_rad_s.value) / one.u, 2);
+  if (count == 0) return std::nullopt;
+  trend.value /= weight;
+  for (const Estimate& one : each) squares += std::pow((one.value - trend.value) / one.u, 2);
   const double beyond = count > 1 ? std::max(1.0, squares / (count - 1)) : 1;  // Birge's ratio, squared
-  trend.per_rad_s.u = std::sqrt(beyond / weight);
-  trend.per_rad_s.freedom = std::max(1.0, freedom);
+  trend.u = std::sqrt(beyond / weight);
+  trend.freedom = std::max(1.0, freedom);
+  return trend;
+}
+
+std::optional<SpeedTrend> speed_trend(const Identification& identification, std::span<const SpeedDependence> speed) {
+  const IdentificationOptions& options = identification.options;
+  if (options.estimator == Estimator::with_offset ||
+      (options.estimator == Estimator::through_origin && options.weighting != Weighting::equal))
+    return std::nullopt;
+  const auto found = common_trend(speed);
+  const double reference = reference_speed(identification);
+  if (!found || !(reference > 0)) return std::nullopt;
   // The library refuses a larger trend: no propeller has one.
-  if (std::abs(trend.per_rad_s.value * trend.reference_rad_s) > compensation::SpeedTrend::kMost) return std::nullopt;
-  return student_test(trend.per_rad_s, 0).rejected() ? std::optional(trend) : std::nullopt;
+  if (std::abs(found->value * reference) > compensation::SpeedTrend::kMost) return std::nullopt;
+  return student_test(*found, 0).rejected() ? std::optional(SpeedTrend{*found, reference}) : std::nullopt;
 }
 
 }  // namespace kphi::fit

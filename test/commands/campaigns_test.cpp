@@ -189,9 +189,14 @@ TEST_F(Campaigns, TeachHowToPlanTheNextOne) {
   const Answer once = say({"plan", written, "--pilot", campaign_.string()});
   EXPECT_EQ(once.code, 2) << "one repetition shows no noise";
   EXPECT_THAT(once.err, HasSubstr("two repetitions"));
-  const std::vector<std::string> stand{"--stand", "noise-n=0.001",        "--stand", "runs=0.001",
-                                       "--stand", "k-t=1.55e-6",          "--stand", "intercept=1.03",
-                                       "--stand", "slope-per-deg=-0.0029"};
+  const std::vector<std::string> stand{"--stand", "noise-n=0.001",
+                                       "--stand", "runs=0.001",
+                                       "--stand", "k-t=1.55e-6",
+                                       "--stand", "intercept=1.03",
+                                       "--stand", "slope-per-deg=-0.0029",
+                                       "--u",     "calibration=0.0005",
+                                       "--u",     "clock=2e-5",
+                                       "--u",     "cross-axis=0"};
   const auto plan = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"plan", written};
     words.insert(words.end(), stand.begin(), stand.end());

@@ -53,8 +53,8 @@ TEST_F(Check, SumsUpACampaign) {
   const std::string path = shipped("icra2021_5in_3blade.yaml");
   EXPECT_THAT(say("check " + path).out,
               testing::AllOf(StartsWith(path + ": valid campaign\n  "), HasSubstr("propeller 5x3 (5-inch three-blade)"),
-                             HasSubstr("  15 runs of 40 steps, 100 to 19100 RPM, 2 s each; 5 mountings\n"),
-                             testing::EndsWith("  order runs listed, steps up\n")));
+                             HasSubstr("  15 runs of 40 steps, 100 to 19100 RPM, 2 s each; 15 mountings\n"),
+                             testing::EndsWith("  order runs listed, steps up, remounted for each repetition\n")));
   const auto file = check({path}).front();
   EXPECT_EQ(file["plan"]["runs"], 15);
   EXPECT_EQ(file["plan"]["spinning_s"], 1200.0);
@@ -63,11 +63,12 @@ TEST_F(Check, SumsUpACampaign) {
 TEST_F(Check, HoldsAnswersAgainstTheCampaignsAmongTheFiles) {
   const std::string answers = shipped("answers_example.yaml"), campaign = shipped("icra2021_6in_2blade.yaml");
   EXPECT_THAT(say("check " + answers + " " + campaign).out,
-              StartsWith(answers + ": valid answers\n  mountings  0 45 90 180 270°\n  run again  0 decisions\n"));
+              StartsWith(answers + ": valid answers\n  mountings  0 0 0 45 45 45 90 90 90 180 180 180 270 270 270°\n  "
+                                   "run again  0 decisions\n"));
   const std::string other = write("other.yaml", changed(read_text(campaign), "[0, 45,", "[0, 60,"));
   const auto bad = check({answers, other});
   EXPECT_EQ(bad[1]["ok"], true);
-  EXPECT_THAT(errors(bad[0]), ElementsAre(HasSubstr("mounting 2 is 45°, the campaign needs 60°")));
+  EXPECT_THAT(errors(bad[0]), ElementsAre(HasSubstr("mounting 4 is 45°, the campaign needs 60°")));
 }
 
 TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {

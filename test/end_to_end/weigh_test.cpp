@@ -74,7 +74,7 @@ TEST(Weigh, IsTakenUpByFitForCampaignsOfItsBenchInItsFolder) {
   const VirtualCampaign here(short_campaign_text("0, 90, 180"), bench_of(1.01));
   (void)ran(joined(weigh(here.path("bench.yaml"), here.path("out")), {"--yes"}));
   const std::string folder = ran(here.command()).folder();
-  const auto fit = ran({kphi(), "fit", folder});
+  const auto fit = ran({kphi(), "fit", "--accept", folder});
   EXPECT_THAT(fit.err, HasSubstr("calibration   weighed with 0.5 kg on 2021-05-30: reads "));
   EXPECT_THAT(fit.err, HasSubstr("% too much along z; in the ±, not corrected"));
   EXPECT_THAT(fit.out, Not(HasSubstr("not in it: repetitions, cell calibration")));
@@ -82,7 +82,7 @@ TEST(Weigh, IsTakenUpByFitForCampaignsOfItsBenchInItsFolder) {
   EXPECT_THAT(file, HasSubstr("cell_weighed: \"weighed with 0.5 kg on 2021-05-30: reads "));
   EXPECT_NEAR(YAML::Load(file)["provenance"]["fit"]["u"]["calibration"].as<double>(), 0.01, 0.001);
   EXPECT_THAT(bytes_of(std::filesystem::path(folder) / "report.html"), HasSubstr("weighed with 0.5 kg on 2021-05-30"));
-  const auto given = ran({kphi(), "fit", folder, "--u", "calibration=0.002"});
+  const auto given = ran({kphi(), "fit", "--accept", folder, "--u", "calibration=0.002"});
   EXPECT_THAT(given.err, Not(HasSubstr("weighed"))) << "what a person says comes first";
 }
 
@@ -104,7 +104,7 @@ TEST(Weigh, OfAnotherBenchOrCellIsNotTakenUp) {
   const auto changed = [&](const std::string& from, const std::string& to) {
     std::string other = text;
     write(kept, other.replace(other.find(from), from.size(), to));
-    return ran({kphi(), "fit", folder}).err;
+    return ran({kphi(), "fit", "--accept", folder}).err;
   };
   EXPECT_THAT(changed("\"bench\": \"test\"", "\"bench\": \"another\""), Not(HasSubstr("weighed")));
   for (const char* serial : {"FT99999", "21001", "1", "", "FT21001x"})

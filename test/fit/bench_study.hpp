@@ -81,6 +81,7 @@ inline AnalysisOptions study_options(const StudyTruth& truth) {
   options.bench.cell_calibration = truth.calibration;
   options.bench.motor_clock = truth.clock;
   options.bench.air_density = truth.density;
+  options.bench.cross_axis = options.bench.alignment_rad = 0;  // of this stand they are known to be none
   options.prediction_deg = {135};
   return options;
 }
@@ -148,6 +149,9 @@ inline BentCount count_bent(const StudyTruth& truth, unsigned campaigns) {
   }
   return count;
 }
+
+/// k falls from K_T on: what lies between 0° and the first occlusion is no question.
+inline StudyTruth without_kink() { return {.line = {.K_T = CampaignTruth().intercept}}; }
 
 /// Real propellers of 5 inch rise by 11 to 21 %.
 inline StudyTruth bent_truth() { return {.bend = 0.03, .rise = 0.15}; }

@@ -18,7 +18,7 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   const Plan plan =
       make_plan(load_campaign(shipped("icra2021_5in_3blade.yaml")), load_bench(shipped("bench_simulated.yaml")));
   EXPECT_EQ(plan.runs.size(), 15u);
-  EXPECT_EQ(plan.mountings, 5);
+  EXPECT_EQ(plan.mountings, 15);
   EXPECT_EQ(plan.steps, 600);
   EXPECT_EQ(plan.spinning, Seconds(1200));
   EXPECT_EQ(plan.bench, Seconds(1260));

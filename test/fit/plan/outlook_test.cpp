@@ -23,7 +23,7 @@ std::string words_after(int runs, std::vector<std::string> wishes = {}) {
   std::vector<Wish> wanted;
   for (const std::string& text : wishes) wanted.push_back(parse_wish(text));
   const profiles::Campaign campaign = planned_campaign();
-  return to_words(reached_so_far(first_runs(campaign, runs), campaign, {}, wanted));
+  return to_words(reached_so_far(first_runs(campaign, runs), campaign, exact_bench(), wanted));
 }
 
 TEST(Outlook, SaysMoreWithEveryRun) {
@@ -41,7 +41,7 @@ TEST(Outlook, OfStepsThatEndByThemselvesCountsThemAsTheyWere) {
   const auto steps = first_runs(campaign, 9);  // of 2 s
   campaign.profile.until = profiles::Until{0.002, Seconds(0.7)};
   campaign.profile.dwell = Seconds(20);
-  EXPECT_THAT(to_words(reached_so_far(steps, campaign, {}, {})), HasSubstr(" in 8 min"));
+  EXPECT_THAT(to_words(reached_so_far(steps, campaign, exact_bench(), {})), HasSubstr(" in 8 min"));
 }
 
 TEST(Outlook, TellsHowFarItIsToAWish) {
@@ -56,10 +56,13 @@ TEST(Outlook, OfOneMoreRepetitionIsBetterByTheRootOfTheirNumber) {
   const profiles::Campaign campaign = planned_campaign();
   IdentificationOptions options;
   options.mounted_once = true;
+  options.mounting = 0;
   Identification identification = identify(simulate(campaign, kStand, 2), options);
-  Analysis analysis = analyse(identification);
+  AnalysisOptions known;
+  known.bench = exact_bench();
+  Analysis analysis = analyse(identification, known);
   const Fitted fitted{std::move(identification), std::move(analysis)};
-  const auto more = one_more_repetition(fitted, campaign, {}, {});
+  const auto more = one_more_repetition(fitted, campaign, {}, exact_bench());
   ASSERT_TRUE(more);
   EXPECT_NEAR(more->minutes, 7, 1e-9) << "five runs of 84 s";
   EXPECT_EQ(more->mountings, 5);

@@ -262,12 +262,12 @@ TEST(ThrustShares, AreInPercentOfTheThrustWithoutOcclusion) {
 
 Analysis analysis() { return analyse(identify(campaign_steps())); }
 
-TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatNobodyKnows) {
+TEST(AnalysisSections, ShowEveryRowOfTheBudgetAndWhatIsAssumed) {
   const Analysis found = analysis();
   const std::string html = analysis_sections(found);
   (void)parsed("<div>" + html + "</div>");
   for (const BudgetRow& row : found.coefficients.front().rows) expect_words(html, {">" + typeset(row.source) + "<"});
-  EXPECT_THAT(html, HasSubstr("unknown; give it with --u")) << "nobody gave the calibration of the cell";
+  EXPECT_THAT(html, HasSubstr("assumed: slopes of loading and unloading")) << "nobody gave the calibration of the cell";
   expect_words(html, {"Uncertainty budget", "combined u"});
 }
 

@@ -30,13 +30,15 @@ struct StudyAnalysis : testing::Test {
   const Analysis analysis = analyse(found, options);
 };
 
-TEST_F(StudyAnalysis, ABudgetHasEverySourceAndSaysWhichNobodyKnows) {
+TEST_F(StudyAnalysis, ABudgetHasEverySourceAndSaysWhatIsAssumed) {
   const Budget budget = analysis.coefficients[1];
   EXPECT_EQ(budget.quantity, "k(45 deg)");
   for (const char* source : {"noise within runs", "repetitions", "zero", "model T = k w^2", "cell calibration",
                              "cross-axis", "alignment", "motor clock"})
     EXPECT_NO_THROW((void)row_of(budget, source)) << source;
-  EXPECT_FALSE(row_of(budget, "cross-axis").known());
+  EXPECT_FALSE(row_of(budget, "motor clock").assumed) << "the study knows it";
+  EXPECT_TRUE(row_of(analyse(found).coefficients[1], "cross-axis").assumed);
+  EXPECT_NEAR(row_of(analyse(found).coefficients[1], "cross-axis").contribution(), 0.002 * budget.value, 1e-18);
   EXPECT_LT(row_of(budget, "repetitions").freedom, 10) << "five angles, three runs each, less what noise hides";
   EXPECT_GE(row_of(budget, "repetitions").freedom, 1);
   EXPECT_NEAR(row_of(budget, "motor clock").contribution(), 2 * 2e-4 * budget.value, 1e-18);
@@ -107,11 +109,13 @@ TEST_F(StudyAnalysis, TorqueFollowsTheSameEstimators) {
               std::hypot(relative(analysis.torque[4].k_q), relative(analysis.torque[0].k_q)), 1e-12);
 }
 
-TEST(Analysis, OneRunEachLeavesTheRepetitionsUnknown) {
+TEST(Analysis, OneRunEachTakesTheUsualScatterOfMountings) {
   auto steps = study_campaign({}, 7).steps;
   std::erase_if(steps, [](const auto& step) { return step.repetition > 1; });
   const Analysis analysis = analyse(identify(steps));
-  EXPECT_FALSE(row_of(analysis.coefficients[0], "repetitions").known());
+  EXPECT_TRUE(row_of(analysis.coefficients[0], "repetitions").assumed);
+  EXPECT_NEAR(row_of(analysis.coefficients[0], "repetitions").contribution() / analysis.coefficients[0].value,
+              kAssumedMounting, 1e-12);
   EXPECT_FALSE(analysis.speed[0].lack_of_fit.tested());
   for (const SpeedDependence& one : analysis.speed) EXPECT_EQ(one.inadequacy > 0, one.depends()) << one.phi_deg;
   EXPECT_TRUE(analysis.speed[0].trend.tested());
@@ -128,23 +132,23 @@ TEST(Analysis, OneRunEachTakesTheScatterOfMountingsAsGiven) {
   EXPECT_EQ(row.evaluation, Evaluation::type_b);
   EXPECT_NEAR(row.contribution() / found.table[1].k, 0.003, 1e-12);
   EXPECT_GT(found.table[1].standard_error, 0.003 * found.table[1].k) << "the line and its test allow for it";
-  EXPECT_EQ(analysis.flight.readiness(), Readiness::fit_to_fly);
+  EXPECT_FALSE(row.assumed);
   EXPECT_EQ(identify(campaign_steps(), {.mounting = 0.5}).repeatability.between.u,
             identify(campaign_steps()).repeatability.between.u)
       << "repetitions tell it better";
 }
 
-TEST(Analysis, PlatesMountedOnceLeaveTheScatterOfMountingsUnknownHoweverManyRuns) {
+TEST(Analysis, PlatesMountedOnceTakeTheUsualScatterOfMountingsHoweverManyRuns) {
   const Identification unknown = identify(campaign_steps(), {.mounted_once = true});
   const auto budget = analyse(unknown).coefficients[1];
-  EXPECT_FALSE(row_of(budget, "mounting").known());
-  EXPECT_TRUE(row_of(budget, "repetitions").known());
-  EXPECT_THAT(budget.not_known(), testing::Contains("mounting"));
+  EXPECT_NEAR(row_of(budget, "mounting").contribution() / unknown.table[1].k, kAssumedMounting, 1e-12);
+  EXPECT_FALSE(row_of(budget, "repetitions").assumed);
+  EXPECT_THAT(budget.assumed(), testing::Contains("mounting"));
 
   const Identification given = identify(campaign_steps(), {.mounting = 0.003, .mounted_once = true});
   EXPECT_NEAR(row_of(analyse(given).coefficients[1], "mounting").contribution() / given.table[1].k, 0.003, 1e-12);
-  EXPECT_NEAR(given.table[1].standard_error, std::hypot(unknown.table[1].standard_error, 0.003 * given.table[1].k),
-              1e-15)
+  const Identification none = identify(campaign_steps(), {.mounting = 0, .mounted_once = true});
+  EXPECT_NEAR(given.table[1].standard_error, std::hypot(none.table[1].standard_error, 0.003 * given.table[1].k), 1e-15)
       << "the line and its test allow for it";
 
   const auto remounted = analyse(identify(campaign_steps())).coefficients[1];
@@ -201,7 +205,10 @@ TEST_F(StudyAnalysis, IsWrittenWithoutWhatJsonCannotHold) {
   EXPECT_EQ(text.find("inf"), std::string::npos);
   EXPECT_THAT(text, HasSubstr("\"source\":\"zero\""));
   const std::string yaml = format_coefficients({found, analysis}, {});
-  EXPECT_THAT(yaml, HasSubstr("not_known: [cross-axis, alignment]"));
+  EXPECT_THAT(yaml, HasSubstr("not_known: []"));
+  EXPECT_THAT(yaml, HasSubstr("assumed: []")) << "the study knows its stand";
+  EXPECT_THAT(format_coefficients(analysed(found), {}),
+              HasSubstr("assumed: [cell calibration, cross-axis, alignment, motor clock]"));
   EXPECT_EQ(yaml, format_coefficients({found, analysis}, {}));
 }
 

@@ -1,0 +1,85 @@
+#include "fit/uncertainty/ideal_disk.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/number.hpp"
+#include "compensation/units.hpp"
+
+namespace kphi::fit {
+namespace {
+
+constexpr double kMetresPerInch = 0.0254;
+/// The mean of a few steps scatters, and so does the air where it is not known.
+constexpr double kRoom = 1.1;
+
+/// Sums of powers over the steps that have both of the two compared.
+struct Powers {
+  double part = 0, whole = 0;
+  void add(double a, double b) {
+    if (!std::isfinite(a) || !(b > 0)) return;
+    part += a;
+    whole += b;
+  }
+  [[nodiscard]] double share() const { return whole > 0 ? part / whole : std::numeric_limits<double>::quiet_NaN(); }
+};
+
+double electrical_w(const results::StepMean& step) {
+  return std::isnan(step.supply_w) ? step.supply_voltage_v * step.supply_current_a : step.supply_w;
+}
+
+}  // namespace
+
+std::vector<std::string> broken_laws_of_power(const Identification& identification) {
+  std::vector<std::string> broken;
+  const OcclusionCoefficient& open = identification.table.front();
+  if (open.phi_deg != 0 || open.measured.empty()) return broken;
+  const double density = identification.air ? identification.air->value : kStandardDensity;
+  const double disk_m2 = kPi / 4 * std::pow(identification.diameter_in * kMetresPerInch, 2);
+  double fastest = 0;
+  for (const results::StepMean& step : open.measured) fastest = std::max(fastest, step.speed_rad_s);
+  Powers of_shaft, of_supply, efficiency;
+  for (const results::StepMean& step : open.measured) {
+    if (step.speed_rad_s < 0.5 * fastest || !(step.thrust_n > 0)) continue;
+    const double ideal_w = disk_m2 > 0 ? std::pow(step.thrust_n, 1.5) / std::sqrt(2 * density * disk_m2)
+                                       : std::numeric_limits<double>::quiet_NaN();
+    const double shaft_w = std::abs(step.torque_nm) * step.speed_rad_s;
+    of_shaft.add(ideal_w, shaft_w);
+    of_supply.add(ideal_w, electrical_w(step));
+    efficiency.add(shaft_w > 0 ? shaft_w : std::numeric_limits<double>::quiet_NaN(), electrical_w(step));
+  }
+  const double merit = of_shaft.share(), least = of_supply.share(), motor = efficiency.share();
+  const auto times = [](double share) { return two_digits(share); };
+  if (merit > kRoom * kLargestFigureOfMerit)
+    broken.push_back(
+        fmt::format("thrust and torque are impossible: by its torque the propeller makes {} times the thrust "
+                    "power of an ideal disk of {:g} inches; check the units of thrust, torque and speed, "
+                    "the torque's lever arm, and the diameter",
+                    times(merit), identification.diameter_in));
+  if (merit < kLeastFigureOfMerit / kRoom)
+    broken.push_back(
+        fmt::format("thrust and torque do not belong together: only {} % of the shaft's power goes into the "
+                    "thrust, usual is 30 to 70 %; check the units of thrust, torque and speed",
+                    two_digits(100 * merit)));
+  if (least > kRoom)
+    broken.push_back(
+        fmt::format("thrust and electrical power are impossible: of its power an ideal disk of {:g} inches "
+                    "would make less thrust ({} times the power is missing); check the units of thrust, "
+                    "voltage and current, and the current's shunt",
+                    identification.diameter_in, times(least)));
+  if (least < kLeastOfElectrical / kRoom)
+    broken.push_back(
+        fmt::format("thrust and electrical power do not belong together: only {} % of the power goes into "
+                    "the thrust; check the units of thrust, voltage and current",
+                    two_digits(100 * least)));
+  if (motor > kRoom * kLargestEfficiency)
+    broken.push_back(
+        fmt::format("torque and electrical power are impossible: the shaft gives {} times the power that the "
+                    "motor takes; check speed (pole count), torque and current",
+                    times(motor)));
+  return broken;
+}
+
+}  // namespace kphi::fit

@@ -1,0 +1,91 @@
+#include "fit/uncertainty/thrust_error.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "compensation/units.hpp"
+#include "test/fit/bench_study.hpp"
+
+namespace kphi::fit {
+namespace thrust_error_test {
+
+/// Largest error of the thrust that flies, over all φ and speeds that the coefficients claim, against the truth.
+double true_error(const StudyTruth& truth, double air, const Fitted& fitted) {
+  const auto& [identification, analysis] = fitted;
+  const compensation::ThrustCurve curve = identification.curve();
+  double worst = 0;
+  for (double phi = 0; phi <= 270; phi += 2.5) {
+    const double flown = curve.thrust_coefficient().value() * curve.scaling_factor(from_degrees(phi));
+    // k of the study jumps above K_T at first contact, which no occlusion does.
+    const double k = std::min(truth.k(0), truth.k(phi)) * air;
+    for (const double rpm : {3000.0, 10000.0, 19100.0}) {
+      const double speed = from_rpm(rpm).value();
+      const double trend =
+          analysis.trend ? 1 + analysis.trend->per_rad_s.value * (speed - analysis.trend->reference_rad_s) : 1;
+      const double held = k * (1 + truth.rise * (rpm / 19100 - 0.5));
+      worst = std::max(worst, std::abs(held / (flown * trend) - 1));
+    }
+  }
+  return worst;
+}
+
+struct Told {
+  int covered = 0, fits = 0;
+  double told = 0, error = 0;  ///< mean shares
+};
+
+Told study(const StudyTruth& truth, CurveForm form, unsigned campaigns) {
+  Told result;
+  for (unsigned seed = 1; seed <= campaigns; ++seed) {
+    const StudyCampaign campaign = study_campaign(truth, seed);
+    IdentificationOptions options;
+    options.curve.form = form;
+    Identification found = identify(campaign.steps, options);
+    Analysis analysis = analyse(found, study_options(truth));
+    const Fitted fitted{std::move(found), std::move(analysis)};
+    const double error = true_error(truth, campaign.density / kStandardDensity, fitted);
+    const FlightReadiness& flight = fitted.analysis.flight;
+    result.covered += error <= flight.error.share ? 1 : 0;
+    result.fits += flight.readiness() == Readiness::fit_to_fly ? 1 : 0;
+    result.told += flight.error.share / campaigns;
+    result.error += error / campaigns;
+  }
+  return result;
+}
+
+TEST(ThrustError, HoldsTheWorstErrorOfTheThrustThatFlies) {
+  constexpr unsigned kCampaigns = 60;
+  for (const auto& [name, truth] : std::vector<std::pair<const char*, StudyTruth>>{
+           {"clean", {}},
+           {"without a kink", without_kink()},
+           {"bend", {.bend = 0.03}},
+           {"rise", {.rise = 0.15}},
+           {"mounting", {.between_runs = 0.01}},
+           {"calibration and clock", {.clock = 0.002, .calibration = 0.006}}}) {
+    for (const CurveForm form : kCurveForms) {
+      const Told told = study(truth, form, kCampaigns);
+      EXPECT_GE(told.covered, 54) << name << ", " << name_of(form) << ": 95 % of 60 are 57";
+      EXPECT_LT(told.told, 0.06) << name << ", " << name_of(form);
+    }
+  }
+}
+
+TEST(ThrustError, OfACleanStandIsNotMuchLargerThanItIs) {
+  const Told told = study(without_kink(), CurveForm::line, 60);
+  EXPECT_LT(told.told, 0.02) << "where the mean error is " << told.error;
+  EXPECT_GE(told.fits, 57);
+}
+
+TEST(ThrustError, NamesItsLargestPartAndTheNextMove) {
+  const StudyTruth truth{.calibration = 0.02};
+  const Analysis analysis = analyse(identify(study_campaign(truth, 1).steps), study_options(truth));
+  const ThrustErrorPart& largest = analysis.flight.error.parts.front();
+  EXPECT_EQ(largest.name, "cell calibration");
+  EXPECT_NEAR(largest.share, 0.04, 0.003);
+  EXPECT_EQ(largest.remedy, "weigh the load cell (kphi weigh)");
+}
+
+}  // namespace thrust_error_test
+}  // namespace kphi::fit
