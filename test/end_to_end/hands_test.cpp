@@ -140,6 +140,13 @@ class Shell {
   void wait_for(const std::string& words) { process_.wait_for(words); }
   /// The program has ended or was stopped.
   void await_ready() { (void)process_.wait_for_prompt({"READY> "}); }
+  /// Lets what was stopped continue, and presses a key that stops it until it has ended.
+  void end_by_a_key() {
+    type("fg");
+    while (hear(std::chrono::milliseconds(200)), words().rfind("READY> ") < words().rfind("fg"))
+      press("x");  // from the first moment in which the terminal is the program's again
+    await_ready();
+  }
   /// Of the last job, which has ended.
   int exit_code() {
     type(
@@ -205,13 +212,49 @@ TEST(CtrlZ, StopsInPlaceWhereNothingCanTurn) {
   shell.press("\x1a");
   shell.await_ready();
   EXPECT_THAT(shell.words(), HasSubstr("Stopped"));
-  shell.type("fg");
-  while (shell.hear(std::chrono::milliseconds(200)), shell.words().rfind("READY> ") < shell.words().rfind("fg"))
-    shell.press("x");  // from the first moment in which the terminal is the program's again
-  shell.await_ready();
+  shell.end_by_a_key();
   EXPECT_EQ(shell.exit_code(), 130) << shell.words();
   EXPECT_TRUE(safely(bench.account().ends_without_power()));
 }
+
+/// What is stopped as soon as it has switched the supply on.
+struct Powered {
+  const char* verb;
+  std::vector<std::string> more;  ///< of its command line; a word with a point is a path in the bench's folder
+};
+
+std::ostream& operator<<(std::ostream& out, const Powered& powered) { return out << powered.verb; }
+
+class CtrlZWithPower : public testing::TestWithParam<Powered> {};
+
+TEST_P(CtrlZWithPower, SwitchesItOffBeforeItStopsTheProgram) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  write(bench.path("two.yaml"), short_campaign_text("0, 180", 1, 2));
+  std::vector<std::string> command{kphi(), GetParam().verb, "--bench", bench.path("bench.yaml")};
+  for (const std::string& word : GetParam().more)
+    command.push_back(word.find('.') == std::string::npos ? word : bench.path(word));
+  Shell shell;
+  shell.start(command);
+  ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == true; })) << shell.words();
+  shell.press("\x1a");
+  shell.await_ready();
+  EXPECT_TRUE(safely(bench.status()["supply"]["output"] == false));
+  EXPECT_THAT(shell.words(), HasSubstr("Stopped"));
+  shell.end_by_a_key();
+  EXPECT_EQ(shell.exit_code(), 130) << shell.words();
+  const Account account = bench.account();
+  EXPECT_TRUE(safely(!has_turned(account)));
+  EXPECT_TRUE(safely(account.ends_without_power()));
+}
+
+const Powered kPowered[] = {
+    {"devices", {"--switch-on", "--clock-gain", "20", "--wake-ups", "0"}},
+    {"weigh", {"--kg", "1", "--out", "out.d"}},
+    {"spin", {"--rpm", "6000", "--out", "out.d"}},
+    {"run", {"two.yaml", "--out", "out.d"}},
+};
+INSTANTIATE_TEST_SUITE_P(Of, CtrlZWithPower, testing::ValuesIn(kPowered),
+                         [](const auto& powered) { return std::string(powered.param.verb); });
 
 TEST(CtrlZ, LeavesNoMotorWhoseKeysBelongToTheShell) {
   RunningBench bench(Manner{.time_scale = 1, .supply = true});
