@@ -12,6 +12,7 @@
 #include "daq/bench/air_source.hpp"
 #include "daq/bench/offered_drivers.hpp"
 #include "daq/campaign/operator.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "daq/hardware/live_bench.hpp"
 #include "daq/hardware/probe.hpp"
@@ -137,10 +138,12 @@ iq::ProbeSettings probe_settings(const profiles::MotorConfig& config, std::optio
   return settings;
 }
 
-DeviceAnswer ask_motor(const profiles::MotorConfig& config, const Clock& clock, std::optional<double> clock_gain_s,
-                       bool powered) {
+DeviceAnswer ask_motor(
+    const profiles::MotorConfig& config, const Clock& clock, std::optional<double> clock_gain_s, bool powered,
+    const StopAsked& stop_asked = [] { return false; }) {
   iq::ProbeSettings settings = probe_settings(config, clock_gain_s);
   settings.search = powered;
+  settings.give_up = stop_asked;
   iq::Probe probe = iq::probe({config.device, config.baud, config.module_id}, clock, settings);
   if (probe.clock_gain) probe.clock_gain->measured_utc = utc_text(clock, clock.now());
   DeviceAnswer answer{"IQ module " + config.device, probe.answers(), probe.lines(), {}};
@@ -169,21 +172,28 @@ bool may_switch_on(const DevicesRequest& asked, const profiles::SupplyConfig& su
   return understood(answer.line.value_or("")) == "on";
 }
 
-/// With the supply's output on for as long as it takes.
+/// With the supply's output on for as long as it takes. A signal switches it off; Ctrl-Z stops this program afterwards.
+/// Throws Interrupted.
 DeviceAnswer ask_motor_with_power(const profiles::BenchConfig& bench, const Clock& clock,
                                   std::optional<double> clock_gain_s) {
+  const SignalWatch signals;
+  const StopAsked stop_asked = [] { return SignalWatch::count() > 0 || SignalWatch::is_suspension_asked(); };
   DeviceAnswer answer{"IQ module " + bench.iq.device};
   try {
-    ModulePower power(bench, clock);
+    ModulePower power(bench, clock, stop_asked);
     const auto give_up = std::chrono::steady_clock::now() + kBootTime;
     do {
-      answer = ask_motor(bench.iq, clock, clock_gain_s, false);
-    } while (!answer.answers && std::chrono::steady_clock::now() < give_up);
+      answer = ask_motor(bench.iq, clock, clock_gain_s, false, stop_asked);
+    } while (!answer.answers && !stop_asked() && std::chrono::steady_clock::now() < give_up);
     const std::string why = power.off();
+    if (stop_asked())
+      throw Interrupted(StopWords{.cause = "stopped by request while the motor module was asked",
+                                  .state = why.empty() ? "supply: output off" : why});
     answer.has_fault = answer.has_fault || !why.empty();
     answer.lines.push_back(why.empty() ? "note: the supply's output was on to ask it, and is off again"
                                        : "fault: " + why + "; cut the power of the motor at the switch");
   } catch (const DeviceError& error) {
+    require_no_stop(stop_asked, "while the supply was switched on");
     answer.has_fault = true;
     answer.lines.push_back(std::string("fault: ") + error.what());
   }

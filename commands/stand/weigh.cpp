@@ -137,8 +137,7 @@ ExitCode weigh(const WeighOptions& options) {
   live::LiveSession view(options.live, subject);
   Terminal terminal(STDIN_FILENO, stderr);
   const StopAsked stop_asked = [&] {
-    if (SignalWatch::take_suspension()) terminal.suspend();  // right here: nothing can turn
-    return SignalWatch::count() > 0 || view.stop_asked();
+    return SignalWatch::count() > 0 || SignalWatch::is_suspension_asked() || view.stop_asked();
   };
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
@@ -154,7 +153,10 @@ ExitCode weigh(const WeighOptions& options) {
                     options.yes ? nullptr : &keys,
                     order_of(options, config),
                     options.times,
-                    from_seconds(options.seconds)};
+                    from_seconds(options.seconds),
+                    [&] {
+                      if (SignalWatch::take_suspension()) terminal.suspend();
+                    }};
   std::string file, in_short;
   results::CellCheck check;
   const results::Weighing weighing = view.tell_the_end(

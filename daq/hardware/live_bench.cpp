@@ -283,10 +283,8 @@ std::string LiveLoadCell::failure() const {
   return state == netbox::State::failed ? "load cell: the stream could not be started again" : "";
 }
 
-ModulePower::ModulePower(const profiles::BenchConfig& config, const Clock& clock)
-    : supply_(*config.supply, clock),
-      sentinel_(last_words_of_supply(config, supply_)),
-      on_(supply_, [] { return false; }) {}
+ModulePower::ModulePower(const profiles::BenchConfig& config, const Clock& clock, const StopAsked& stop_asked)
+    : supply_(*config.supply, clock), sentinel_(last_words_of_supply(config, supply_)), on_(supply_, stop_asked) {}
 
 LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
     : config_(config),

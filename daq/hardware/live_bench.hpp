@@ -86,8 +86,8 @@ class LiveLoadCell final : public LoadCellLink {
 /// a sentinel switches it off if this program dies.
 class ModulePower {
  public:
-  /// Throws DeviceError, also for a supply that no sentinel can switch off.
-  ModulePower(const profiles::BenchConfig& config, const Clock& clock);
+  /// Throws DeviceError, also for a supply that no sentinel can switch off; Interrupted, with the output off again.
+  ModulePower(const profiles::BenchConfig& config, const Clock& clock, const StopAsked& stop_asked);
   /// Empty, or why the output may still be on.
   [[nodiscard]] std::string off() noexcept { return supply_.switch_off(); }
 

@@ -148,6 +148,7 @@ class Procedure {
   void tick() {
     order_.bench.wait_until(order_.bench.clock().now() + kTick);
     stand_.check();
+    order_.while_at_rest();
     if (order_.stop_asked()) throw Interrupted("stopped by request");
     take();
     if (const std::string failure = stream_.cell.failure(); !failure.empty()) throw DeviceError("weigh: " + failure);

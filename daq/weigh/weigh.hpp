@@ -26,6 +26,8 @@ struct Weigh {
   results::Weighing weighing;                  ///< what is known before: bench, mass, gravity, axis
   int times = 3;                               ///< on and off
   Duration stretch = std::chrono::seconds(3);  ///< of samples for one mean
+  /// Called again and again while the motor is at rest, and without power if kphi controls that: Ctrl-Z may stop kphi.
+  std::function<void()> while_at_rest = [] {};
 };
 
 /// Asks, waits until the load is at rest, measures; off, on, off, … . What cannot be the mass is asked for again.

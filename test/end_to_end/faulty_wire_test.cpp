@@ -3,6 +3,7 @@
 
 #include "results/run_reader.hpp"
 #include "test/end_to_end/running_bench.hpp"
+#include "test/profiles/refusals.hpp"
 
 namespace kphi::test::faulty_wire_test {
 
@@ -86,6 +87,24 @@ TEST(FaultInjector, ACellThatRepeatsOneValueIsNamedByDevicesAndRefusedByARun) {
                                  Not(HasSubstr("Fx repeats one value"))));
   EXPECT_THAT(ran(bench.run_command(), 4).err, HasSubstr("Fz repeated one value in all"));
   EXPECT_TRUE(safely(bench.account().last_speed_at() < 0)) << "nothing has turned";
+}
+
+TEST(FaultInjector, ABoxThatRebootsInsideTheZeroIsSaidToFlagNoStepThatHasAZero) {
+  RunningBench bench(Manner{4, 7000, "  - {at_s: 16, kind: reboot, down_s: 0.1, resume: true}\n"});
+  write(bench.path("short.yaml"), profiles::changed(short_campaign_text("0", 1, 3), "zero_s: 0.5", "zero_s: 20"));
+  const Ended run = ran(bench.run_command());
+  std::filesystem::path file;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(bench.path("results")))
+    if (entry.path().extension() == ".h5") file = entry.path();
+  const results::RunRecording kept = results::read_run(file);
+  const auto boot = std::ranges::find(kept.events, EventKind::rebooted, &StreamEvent::kind);
+  ASSERT_NE(boot, kept.events.end()) << run.err;
+  const auto begin = std::ranges::find(kept.phases, results::Phase::zero_before, &results::PhaseMark::phase);
+  ASSERT_NE(begin, kept.phases.end());
+  ASSERT_GT(boot->time_ns, begin->time_ns);
+  ASSERT_LT(boot->time_ns, std::next(begin)->time_ns) << "inside the zero";
+  EXPECT_THAT(bytes_of(std::filesystem::path(run.folder()) / "steps.csv"), Not(HasSubstr("rebooted")));
+  EXPECT_THAT(run.err, AllOf(HasSubstr("the box has booted"), HasSubstr("without a zero taken since are flagged")));
 }
 
 TEST(FaultInjector, APageInUtf16IsRefusedInOneLine) {

@@ -94,32 +94,76 @@ TEST_P(SecondAfterGo, BelongsToTheKeyThatStops) {
 INSTANTIATE_TEST_SUITE_P(Pressed, SecondAfterGo, testing::Values("AtOnce", "WithPower"),
                          [](const auto& when) { return std::string(when.param); });
 
+/// As RPM.
+double fastest(const Account& account, double from_ms, double to_ms) {
+  double rpm = 0;
+  for (const Account::Command& command : account.commands)
+    if (command.mode == "velocity" && command.at >= from_ms && command.at <= to_ms)
+      rpm = std::max(rpm, to_rpm(RadPerSec(std::abs(command.target))));
+  return rpm;
+}
+
+TEST(KeyHeldDown, LeadsTheMotorByOneStepWhenItIsLetGo) {
+  constexpr double kStart = 3000, kStep = 500, kSlew = 2000;          // RPM, RPM/s
+  constexpr double kEvery_ms = 33, kHeld_ms = 1000, kTaken_ms = 200;  // by the program; on a busy computer
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  Terminal terminal;
+  Process program(in_real_time({kphi(), "spin", "--bench", bench.path("bench.yaml"), "--rpm", "3000", "--dead-man", "4",
+                                "--out", bench.path("results")}),
+                  {}, {{}, terminal.descriptor(), 0});
+  program.wait_for_prompt();
+  terminal.type("go");
+  ASSERT_TRUE(bench.await([](const auto& now) {
+    return to_rpm(RadPerSec(now["drive"]["target"].template get<double>())) > kStart - 1 && now["speed_rad_s"] > 290;
+  })) << program.err();
+  const double pressed_ms = bench.time_ms();
+  double let_go_ms = pressed_ms;
+  for (double due_ms = pressed_ms; let_go_ms < pressed_ms + kHeld_ms; due_ms += kEvery_ms) {
+    terminal.press("\x1b[A");
+    ASSERT_TRUE(
+        bench.await([&](const auto& now) { return 1e3 * now["bench_time_s"].template get<double>() > due_ms; }));
+    let_go_ms = bench.time_ms();
+  }
+  ASSERT_EQ(program.wait(), 0) << program.err();  // what else ended it says nothing about keys
+  EXPECT_THAT(program.err(), HasSubstr("no key for 4 s"));
+  const Account account = bench.account();
+  const double led_rpm = fastest(account, let_go_ms - kTaken_ms, let_go_ms + kTaken_ms);
+  EXPECT_GT(led_rpm, kStart + kStep) << "it follows";
+  EXPECT_TRUE(safely(fastest(account, 0, account.coasts_at()) <= led_rpm + kStep + 1))
+      << led_rpm << " RPM when the key was let go, then " << fastest(account, 0, account.coasts_at());
+  EXPECT_LE(led_rpm, kStart + kSlew * 1e-3 * (let_go_ms - pressed_ms + 2 * kTaken_ms)) << "no faster than its slew";
+  EXPECT_TRUE(safely(account.ends_without_power()));
+}
+
 TEST(SignalAtTheStart, LetsNoPowerComeOnAndNoneStay) {
   RunningBench bench(Manner{.time_scale = 1, .supply = true});
   constexpr double kObeyed_ms = 400;  // an order on the wire is answered and checked before the next one
   constexpr double kUnderWay_ms = 100;
-  std::vector<double> signals_ms;
+  struct Run {
+    double signal_ms, ended_ms;
+  };
+  std::vector<Run> runs;
   for (const int delay_ms : {200, 350, 500, 650, 800, 950, 1100, 1200}) {
     Process run(bench.run_command());
     const double due_ms = bench.time_ms() + delay_ms;
     ASSERT_TRUE(
         bench.await([&](const auto& now) { return 1e3 * now["bench_time_s"].template get<double>() > due_ms; }));
     run.signal(SIGINT);
-    signals_ms.push_back(bench.time_ms());
+    const double signal_ms = bench.time_ms();
     EXPECT_EQ(run.wait(), 130) << delay_ms << run.err();
+    runs.push_back({signal_ms, bench.time_ms()});
   }
   const Account account = bench.account();
   EXPECT_TRUE(safely(!has_turned(account)));
   for (std::size_t i = 0; i < account.outputs.size(); ++i) {
     if (!account.outputs[i]) continue;
-    // On before its signal, or not at all; off soon after it.
-    // At most that order was under way.
-    const auto signal =
-        std::ranges::find_if(signals_ms, [&](double at) { return at > account.outputs_at[i] - kUnderWay_ms; });
-    ASSERT_NE(signal, signals_ms.end());
+    // On before the signal of its run, unless that order was under way, or not at all; off soon after it.
+    const auto run = std::ranges::find_if(runs, [&](const Run& one) { return account.outputs_at[i] <= one.ended_ms; });
+    ASSERT_NE(run, runs.end());
     ASSERT_LT(i + 1, account.outputs.size());
-    EXPECT_TRUE(safely(account.outputs_at[i + 1] <= *signal + kObeyed_ms))
-        << "on at " << account.outputs_at[i] << ", signal at " << *signal << ", off at " << account.outputs_at[i + 1];
+    const double on_ms = account.outputs_at[i] - run->signal_ms, off_ms = account.outputs_at[i + 1] - run->signal_ms;
+    EXPECT_TRUE(safely(on_ms <= kUnderWay_ms && off_ms <= kObeyed_ms))
+        << "on " << on_ms << " ms and off " << off_ms << " ms after the signal";
   }
 }
 
@@ -140,6 +184,13 @@ class Shell {
   void wait_for(const std::string& words) { process_.wait_for(words); }
   /// The program has ended or was stopped.
   void await_ready() { (void)process_.wait_for_prompt({"READY> "}); }
+  /// Lets what was stopped continue, and presses a key that stops it until it has ended.
+  void end_by_a_key() {
+    type("fg");
+    while (hear(std::chrono::milliseconds(200)), words().rfind("READY> ") < words().rfind("fg"))
+      press("x");  // from the first moment in which the terminal is the program's again
+    await_ready();
+  }
   /// Of the last job, which has ended.
   int exit_code() {
     type(
@@ -205,13 +256,49 @@ TEST(CtrlZ, StopsInPlaceWhereNothingCanTurn) {
   shell.press("\x1a");
   shell.await_ready();
   EXPECT_THAT(shell.words(), HasSubstr("Stopped"));
-  shell.type("fg");
-  while (shell.hear(std::chrono::milliseconds(200)), shell.words().rfind("READY> ") < shell.words().rfind("fg"))
-    shell.press("x");  // from the first moment in which the terminal is the program's again
-  shell.await_ready();
+  shell.end_by_a_key();
   EXPECT_EQ(shell.exit_code(), 130) << shell.words();
   EXPECT_TRUE(safely(bench.account().ends_without_power()));
 }
+
+/// What is stopped as soon as it has switched the supply on.
+struct Powered {
+  const char* verb;
+  std::vector<std::string> more;  ///< of its command line; a word with a point is a path in the bench's folder
+};
+
+std::ostream& operator<<(std::ostream& out, const Powered& powered) { return out << powered.verb; }
+
+class CtrlZWithPower : public testing::TestWithParam<Powered> {};
+
+TEST_P(CtrlZWithPower, SwitchesItOffBeforeItStopsTheProgram) {
+  RunningBench bench(Manner{.time_scale = 1, .supply = true});
+  write(bench.path("two.yaml"), short_campaign_text("0, 180", 1, 2));
+  std::vector<std::string> command{kphi(), GetParam().verb, "--bench", bench.path("bench.yaml")};
+  for (const std::string& word : GetParam().more)
+    command.push_back(word.find('.') == std::string::npos ? word : bench.path(word));
+  Shell shell;
+  shell.start(command);
+  ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == true; })) << shell.words();
+  shell.press("\x1a");
+  shell.await_ready();
+  EXPECT_TRUE(safely(bench.status()["supply"]["output"] == false));
+  EXPECT_THAT(shell.words(), HasSubstr("Stopped"));
+  shell.end_by_a_key();
+  EXPECT_EQ(shell.exit_code(), 130) << shell.words();
+  const Account account = bench.account();
+  EXPECT_TRUE(safely(!has_turned(account)));
+  EXPECT_TRUE(safely(account.ends_without_power()));
+}
+
+const Powered kPowered[] = {
+    {"devices", {"--switch-on", "--clock-gain", "20", "--wake-ups", "0"}},
+    {"weigh", {"--kg", "1", "--out", "out.d"}},
+    {"spin", {"--rpm", "6000", "--out", "out.d"}},
+    {"run", {"two.yaml", "--out", "out.d"}},
+};
+INSTANTIATE_TEST_SUITE_P(Of, CtrlZWithPower, testing::ValuesIn(kPowered),
+                         [](const auto& powered) { return std::string(powered.param.verb); });
 
 TEST(CtrlZ, LeavesNoMotorWhoseKeysBelongToTheShell) {
   RunningBench bench(Manner{.time_scale = 1, .supply = true});

@@ -109,14 +109,20 @@ TEST(Program, SwitchesTheSupplyOnToAskTheModuleAtItsUsersWordAlone) {
   EXPECT_EQ(account.last_speed_at(), -1) << "and nothing turns";
 }
 
-TEST(Program, ThatIsKilledWhileItAsksTheModuleLeavesNoPowerOn) {
+TEST(Program, ThatIsEndedWhileItAsksTheModuleLeavesNoPowerOn) {
   Manner manner;
   manner.supply = true;
   RunningBench bench(manner);
-  Process devices({kphi(), "devices", "--clock-gain", "600", "--switch-on", "--bench", bench.path("bench.yaml")});
-  ASSERT_TRUE(bench.await([](const json& now) { return now["supply"]["output"] == true; }));
-  devices.signal(SIGKILL);
-  EXPECT_TRUE(safely(bench.await([](const json& now) { return now["supply"]["output"] == false; })));
+  for (const auto& [signal, exit_code] : {std::pair(SIGKILL, 128 + SIGKILL), std::pair(SIGINT, 130)}) {
+    Process devices({kphi(), "devices", "--clock-gain", "600", "--switch-on", "--bench", bench.path("bench.yaml")});
+    ASSERT_TRUE(bench.await([](const json& now) { return now["supply"]["output"] == true; }));
+    devices.signal(signal);
+    EXPECT_EQ(devices.wait(), exit_code) << devices.err();
+    if (signal == SIGINT) {
+      EXPECT_TRUE(safely(bench.status()["supply"]["output"] == false)) << "before it ends";
+    }
+    EXPECT_TRUE(safely(bench.await([](const json& now) { return now["supply"]["output"] == false; })));
+  }
 }
 
 TEST(Program, AsksAboutADoubtfulCampaignBeforeAnythingHasPower) {

@@ -138,7 +138,10 @@ void look_at(Motor& module, const Clock& clock, const ProbeSettings& settings, P
   // One question at a time: only a query that has the line to itself tells the round trip.
   const Ask ask = [&](const std::vector<Inquiry>& inquiries) {
     std::vector<Reply> replies;
-    for (const Inquiry& inquiry : inquiries) replies.push_back(module.inquire({inquiry}).at(0));
+    for (const Inquiry& inquiry : inquiries) {
+      if (settings.give_up()) throw DeviceError("motor module on " + module.device(), "ask", "stopped by request");
+      replies.push_back(module.inquire({inquiry}).at(0));
+    }
     return replies;
   };
   found.adapter = serial::adapter_of(serial::path_of(module.device()));
@@ -265,7 +268,7 @@ Probe probe(const SerialLine& line, const Clock& clock, const ProbeSettings& set
     Settings inspecting;
     inspecting.module_id = line.module_id;
     inspecting.inspects = true;
-    module.emplace(line.device, line.baud, inspecting, clock);
+    module.emplace(line.device, line.baud, inspecting, clock, std::string(), settings.give_up);
     look_at(*module, clock, settings, found);
   } catch (const DeviceError& error) {
     found.findings.push_back({Severity::fault, error.what(), ""});

@@ -2,6 +2,7 @@
 // baud rate or id.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -38,6 +39,8 @@ struct ProbeSettings {
   Intention intention;                          ///< what the module is audited against
   std::optional<ClockGainSettings> clock_gain;  ///< measure it, which takes as long as it says
   bool search = true;                           ///< a silent module: try other baud rates and ids, 5 s more
+  /// Asked while it connects and before each question; true ends the probe with a fault.
+  std::function<bool()> give_up = [] { return false; };
 };
 
 struct Probe {
