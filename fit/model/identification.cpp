@@ -174,11 +174,6 @@ const char* name_of(Weighting weighting) {
   return names[static_cast<std::size_t>(weighting)];
 }
 
-const char* name_of(Loss loss) {
-  constexpr std::array<const char*, 4> names{"none", "huber", "cauchy", "tukey"};
-  return names[static_cast<std::size_t>(loss)];
-}
-
 std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> steps, const IdentificationOptions& options,
                                                   double at_speed_rad_s, Repeatability& repeatability) {
   std::vector<OcclusionCoefficient> table;

@@ -72,7 +72,7 @@ TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
   const std::string config = steps("5x3");
   const std::vector<std::vector<std::string>> ways{
       {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
-      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180"},
+      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180", "--curve-loss", "cauchy"},
       {"--leave-out", "90:2:plate slipped", "--propeller", "mine", "--at-speed-rpm", "19100"}};
   for (std::vector<std::string> way : ways) {
     way.insert(way.begin(), {"fit", config});
