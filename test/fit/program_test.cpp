@@ -3,14 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <tuple>
 
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
 #include "results/file_layer.hpp"
+#include "results/reduction/step_averages.hpp"
 #include "results/steps_csv.hpp"
 #include "test/end_to_end/process.hpp"
 #include "test/fit/bench_study.hpp"
@@ -72,7 +75,8 @@ TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
   const std::string config = steps("5x3");
   const std::vector<std::vector<std::string>> ways{
       {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
-      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180", "--curve-loss", "cauchy"},
+      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180",
+       "--curve-loss", "cauchy"},
       {"--leave-out", "90:2:plate slipped", "--propeller", "mine", "--at-speed-rpm", "19100"}};
   for (std::vector<std::string> way : ways) {
     way.insert(way.begin(), {"fit", config});
@@ -82,6 +86,29 @@ TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
     ASSERT_EQ(kphi({"report", config}).code, 0);
     EXPECT_TRUE(results::read_text(config + "/report.html") == page) << way[2];
   }
+}
+
+TEST_F(FitProgram, FitsTheMeansOfACampaignAsItsSteps) {
+  const std::string folder = steps("5x3");
+  auto means = results::means_of(results::read_steps(folder + "/steps.csv"));
+  results::write_steps(folder + "/means.csv", means);
+  const auto fitted = [&](const std::string& table) {
+    const Answer answer = kphi(
+        {"fit", folder + "/" + table, "--json", "--no-report", "--accept", "--out", folder + "/" + table + ".yaml"});
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return std::pair(json::parse(answer.out), answer.err);
+  };
+  const auto [of_steps, said_of_steps] = fitted("steps.csv");
+  const auto [of_means, said_of_means] = fitted("means.csv");
+  EXPECT_NEAR(of_means["K_T"].get<double>() / of_steps["K_T"].get<double>(), 1, 1e-6);
+  EXPECT_NEAR(of_means["K_T_expanded_95"].get<double>() / of_steps["K_T_expanded_95"].get<double>(), 1, 0.3)
+      << "of one campaign, whose zeros do not tell how far they moved";
+  EXPECT_THAT(results::read_text(folder + "/means.csv.yaml"), HasSubstr("repetitions: 3"));
+  EXPECT_THAT(said_of_means, Not(HasSubstr("unknown number")));
+  for (auto& row : means)
+    row.repetitions_averaged = row.repetitions_left_out = row.k_scatter_share = row.thrust_scatter_n = std::nan("");
+  results::write_steps(folder + "/means.csv", means);
+  EXPECT_THAT(fitted("means.csv").second, HasSubstr("averages of an unknown number of repetitions"));
 }
 
 TEST_F(FitProgram, HandsTheOverlapMeasureToWhoFlies) {
@@ -301,12 +328,46 @@ TEST_F(FitProgram, FitsTheLinesThatNistCertified) {
   }
 }
 
+TEST_F(FitProgram, AveragesTheRowsOfATableThatNamesAnAngleTwice) {
+  const std::string table =
+      file("twice.csv",
+           "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n0,1.503e-6\n90,1.201e-6\n90,1.199e-6\n180,8.99e-7\n"
+           "180,9.01e-7\n270,6.01e-7\n270,6e-7\n");
+  const std::string out = (folder_ / "twice.yaml").string();
+  const Answer twice = kphi({"fit", table, "--no-report", "--accept", "--out", out});
+  EXPECT_EQ(twice.code, 0) << twice.err;
+  EXPECT_THAT(twice.err,
+              HasSubstr("4 of 4 angles are listed more than once, in 8 rows: averaged; their scatter, 0.13 % of "
+                        "k by 4 degrees of freedom, is the error of every k"));
+  const std::string text = results::read_text(out);
+  EXPECT_THAT(text, HasSubstr("phi_deg: 90.0, k: 1.2e-06, u: "));
+  EXPECT_THAT(text, Not(HasSubstr("u: unknown")));
+}
+
+TEST_F(FitProgram, FitsStepsWithoutTheirZeroAndSaysSo) {
+  const std::string folder = steps("5x3");
+  std::string text = results::read_text(folder + "/steps.csv");
+  std::istringstream lines(text);
+  std::string header, without;
+  std::getline(lines, header);
+  const auto place =
+      std::count(header.begin(), header.begin() + static_cast<std::ptrdiff_t>(header.find("zero_n")), ',');
+  lines.seekg(0);
+  for (std::string line; std::getline(lines, line);) {
+    std::size_t begin = 0;
+    for (long i = 0; i < place; ++i) begin = line.find(',', begin) + 1;
+    without += line.erase(begin, line.find(',', begin) + 1 - begin) + "\n";
+  }
+  const std::string out = (folder_ / "k.yaml").string();
+  const Answer fit = kphi({"fit", file("steps.csv", without), "--no-report", "--accept", "--out", out, "--json"});
+  const Answer whole = kphi({"fit", folder, "--no-report", "--accept", "--json"});
+  EXPECT_EQ(fit.code, 0) << fit.err;
+  EXPECT_THAT(fit.err, HasSubstr("the zero that was subtracted from the thrust is unknown (no zero_n)"));
+  EXPECT_EQ(json::parse(fit.out)["K_T"], json::parse(whole.out)["K_T"]);
+  EXPECT_THAT(whole.err, Not(HasSubstr("zero that was subtracted")));
+}
+
 TEST_F(FitProgram, FitsATableThatCannotFlyAsFarAsItGoes) {
-  const Answer twice =
-      kphi({"fit", file("twice.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n90,1.2e-6\n90,1.1e-6\n180,8e-7\n")});
-  EXPECT_EQ(twice.code, 5);
-  EXPECT_THAT(twice.out, AllOf(HasSubstr("do not fly yet"), HasSubstr("phi_deg 90 is listed twice"),
-                               HasSubstr("by the scatter of 4 points about the line; no u of k was given")));
   const Answer without = kphi({"fit", file("without.csv", "phi_deg,k_n_s2_per_rad2\n90,1.2e-6\n180,8e-7\n")});
   EXPECT_EQ(without.code, 5);
   EXPECT_THAT(without.out, AllOf(HasSubstr("it has no k at phi_deg 0"), Not(HasSubstr("slope      -4.44444e-09 ±"))));
