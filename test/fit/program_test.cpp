@@ -135,7 +135,11 @@ TEST_F(FitProgram, ComparesAFamilyFromItsFolders) {
   std::vector<std::string> words{"compare", places[0], places[1], places[2], places[3]};
   const Answer table = kphi(words);
   EXPECT_EQ(table.code, 0) << table.err;
-  EXPECT_THAT(table.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));
+  EXPECT_THAT(table.out, AllOf(Not(HasSubstr("the paper's statement")), HasSubstr("One slope")));
+  words.emplace_back("--claims");
+  const Answer claims = kphi(words);
+  EXPECT_EQ(claims.code, 0) << claims.err;
+  EXPECT_THAT(claims.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));
   words.insert(words.end(), {"--predict", "7x3", "--json"});
   const json found = json::parse(kphi(words).out);
   EXPECT_EQ(found.at("claims").size(), 16u);
@@ -145,6 +149,36 @@ TEST_F(FitProgram, ComparesAFamilyFromItsFolders) {
   expect_refused({"compare", places[0], places[1], places[2], "--predict", "seven"}, 2, "such as 7x3");
   expect_refused({"compare", places[0], places[1], places[2], "--expect", "agree"}, 2, "two results");
   expect_refused({"compare", places[0]}, 2, "RESULT");
+}
+
+TEST_F(FitProgram, ComparesLogsOverTheSpeedsOfBoth) {
+  // k of this propeller rises by 6 % over the speeds; one log has the slow half of them, the other the fast.
+  std::vector<std::string> logs;
+  for (const auto& [name, from, to] : {std::tuple("slow", 3000.0, 12000.0), std::tuple("fast", 8000.0, 20000.0)}) {
+    StudyTruth rising;
+    rising.rise = 0.06;
+    rising.calibration = rising.density = rising.clock = 0;
+    auto all = study_campaign(rising, 7).steps;
+    std::erase_if(all, [&, from = from, to = to](const results::StepMean& step) {
+      const double rpm = to_rpm(RadPerSec(step.commanded_speed_rad_s));
+      return step.occlusion_deg > 0 || rpm < from || rpm > to;
+    });
+    std::filesystem::create_directories(folder_ / name);
+    results::write_steps(folder_ / (std::string(name) + "/steps.csv"), all);
+    logs.push_back((folder_ / name).string());
+  }
+  const Answer answer = kphi({"compare", logs[0], logs[1], "--json"});
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json found = json::parse(answer.out);
+  EXPECT_NEAR(found["differences"][0]["share"].get<double>(), 0, 1e-9) << "the same steps, where both have them";
+  EXPECT_THAT(answer.out, HasSubstr("which both reached"));
+  const json slow = json::parse(kphi({"fit", logs[0], "--json", "--no-report"}).out),
+             fast = json::parse(kphi({"fit", logs[1], "--json", "--no-report"}).out);
+  EXPECT_GT(fast["K_T"].get<double>() / slow["K_T"].get<double>(), 1.01) << "or there was nothing to mend";
+  const json alone = json::parse(kphi({"compare", logs[0], logs[0], "--json"}).out);
+  EXPECT_NEAR(alone["differences"][0]["a"].get<double>() / slow["k_standard"].get<double>(), 1, 1e-12)
+      << "a fit and a comparison give one number";
+  EXPECT_THAT(kphi({"compare", logs[0], steps("5x3")}).err, HasSubstr("not fitted yet"));
 }
 
 TEST_F(FitProgram, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
