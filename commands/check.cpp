@@ -39,6 +39,7 @@ struct CheckedFile {
   std::string kind;             ///< empty: unknown
   std::string summary;          ///< a few lines; empty if refused
   Json errors = Json::array();  ///< message; of a finding also line, column, what, next_move
+  bool changed = false;         ///< since kphi wrote it, or what it was made from
   // For the checks of one file against another.
   std::optional<Campaign> campaign;
   std::optional<BenchConfig> bench;
@@ -225,7 +226,7 @@ const std::vector<Kind>& kinds() {
       ours(FileKind::world, [](Text text, File file) { return lines_of(profiles::parse_world(text, file.path)); },
            {"k_t_n_per_rpm2", "loss_law"}),
       {"coefficients", compensation::kCoefficientFormat,
-       [](Text, File file) { return lines_of(load_sealed_coefficients(file.path)); }},
+       [](Text, File file) { return lines_of(load_standing_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",
        [](Text text, File file) { return lines_of(sim::parse_faults(text, file.path)); }},
       {"simulated motor", "kphi-sim-motor/1",
@@ -279,6 +280,9 @@ void attempt(CheckedFile& file, Check&& check) {
       KPHI_JSON_MEMBERS(error, finding, what, next_move);
       KPHI_JSON_MEMBERS(error, finding.mark, line, column);
     }
+  } catch (const DataRejected& refused) {
+    file.changed = true;
+    file.errors.push_back({{"message", refused.what()}});
   } catch (const std::runtime_error& refused) {
     file.errors.push_back({{"message", refused.what()}});
   }
@@ -330,7 +334,8 @@ ExitCode check(const CheckOptions& options) {
   check_together(files);
   for (const CheckedFile& file : files) options.json ? print_report(file) : print(file);
   const bool ok = std::ranges::all_of(files, [](const CheckedFile& file) { return file.errors.empty(); });
-  return ok ? ExitCode::ok : ExitCode::usage;
+  const bool changed = std::ranges::all_of(files, [](const auto& file) { return file.changed || file.errors.empty(); });
+  return ok ? ExitCode::ok : changed ? ExitCode::data_rejected : ExitCode::usage;
 }
 
 }  // namespace

@@ -1,14 +1,18 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
 #include "commands/outputs.hpp"
 #include "compensation/file/plausibility.hpp"
+#include "compensation/units.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/propellers/claims.hpp"
@@ -55,14 +59,71 @@ ExitCode compare_family(const CompareRequest& request) {
     fmt::print("{}", request.json ? history_json(history) : history_text(history));
     return ExitCode::ok;
   }
-  const FamilyFindings findings = findings_of(family, sizes);
+  FamilyFindings findings = findings_of(family, sizes);
+  if (!request.claims) findings.claims.clear();
   fmt::print("{}", request.json ? Json(findings).dump(2) + "\n" : family_text(findings));
   return ExitCode::ok;
 }
 
+/// A log: steps without occlusion, or those without it of a table that is named itself.
+std::optional<FitInput> log_of(const std::string& path) {
+  const fs::path place(path);
+  const bool is_table = !fs::is_directory(place) && place.extension() == ".csv";
+  if (!is_table && (!fs::is_directory(place) || fs::exists(place / "coefficients.yaml"))) return std::nullopt;
+  if (!is_table && !fs::exists(place / "steps.csv")) return std::nullopt;
+  if (is_table && fs::exists(place.parent_path() / "journal.jsonl"))
+    results::require_intact(results::CampaignFolder::open(place.parent_path()));
+  FitInput input = load_input(path);
+  if (!input.table.empty())
+    throw ConfigurationError(path + ": a table of k; compare the coefficients that `kphi fit` makes of it");
+  const auto occluded = [](const auto& step) { return step.occlusion_deg > 0; };
+  if (!is_table && std::ranges::any_of(input.steps, occluded)) return std::nullopt;  // not fitted yet
+  std::erase_if(input.steps, occluded);
+  return input;
+}
+
+/// As `kphi fit` and `kphi report` do it, over `range`.
+Fitted fitted_log(const FitInput& input, const SpeedRange& range) {
+  Identification K_T = identify(input.steps, {.speed_range = range, .mounted_once = input.mounted_once});
+  Analysis analysis = analyse(K_T, analysis_options(input, K_T));
+  return {std::move(K_T), std::move(analysis)};
+}
+
+/// Two logs over the speeds that both have, since k of a real propeller rises with speed.
+Comparison compare_logs(const FitInput& a, const FitInput& b, const CompareRequest& request) {
+  const SpeedRange all = IdentificationOptions().speed_range;
+  Fitted of_a = fitted_log(a, all), of_b = fitted_log(b, all);
+  const Identification &one = of_a.identification, &other = of_b.identification;
+  const SpeedRange common{std::max(one.speed_min_rad_s, other.speed_min_rad_s),
+                          std::min(one.speed_max_rad_s, other.speed_max_rad_s)};
+  const auto differs = [&](const Identification& log) {
+    return !same_level(log.speed_min_rad_s, common.min_rad_s) || !same_level(log.speed_max_rad_s, common.max_rad_s);
+  };
+  std::string remark;
+  if (!(common.max_rad_s > common.min_rad_s)) {
+    remark = "they have no range of speeds in common: each over its own";
+  } else if (differs(one) || differs(other)) {
+    remark =
+        fmt::format("compared from {:.0f} to {:.0f} RPM, which both reached; alone, each is fitted over all its speeds",
+                    to_rpm(RadPerSec(common.min_rad_s)), to_rpm(RadPerSec(common.max_rad_s)));
+    of_a = fitted_log(a, common);
+    of_b = fitted_log(b, common);
+  }
+  Comparison comparison = compare(result_of_log(of_a, a.provenance.origin, request.results.front()),
+                                  result_of_log(of_b, b.provenance.origin, request.results.back()));
+  if (!remark.empty()) comparison.remarks.push_back(remark);
+  return comparison;
+}
+
+ComparedResult loaded(const std::optional<FitInput>& log, const std::string& path) {
+  if (!log) return load_result(path);
+  return result_of_log(fitted_log(*log, IdentificationOptions().speed_range), log->provenance.origin, path);
+}
+
 ExitCode compare_truth(const CompareRequest& request) {
   if (request.results.size() > 1) throw ConfigurationError("--truth compares one RESULT with the simulated truth");
-  const TruthCheck check = check_against_truth(load_result(request.results.front()), request.truth);
+  const TruthCheck check =
+      check_against_truth(loaded(log_of(request.results.front()), request.results.front()), request.truth);
   fmt::print("{}", check.text);
   if (check.close) return ExitCode::ok;
   fmt::print(stderr, "kphi: too far from the truth: K_T must agree within 0.5 %, the slope within 2 %\n");
@@ -73,7 +134,9 @@ ExitCode run_compare(const CompareRequest& request) {
   if (!request.truth.empty()) return compare_truth(request);
   if (request.results.size() < 2) throw ConfigurationError("compare needs two RESULTs, or one RESULT and --truth");
   if (request.results.size() > 2 || request.claims || !request.predict.empty()) return compare_family(request);
-  const Comparison comparison = compare(load_result(request.results.front()), load_result(request.results.back()));
+  const auto a = log_of(request.results.front()), b = log_of(request.results.back());
+  const Comparison comparison = a && b ? compare_logs(*a, *b, request)
+                                       : compare(loaded(a, request.results.front()), loaded(b, request.results.back()));
   fmt::print("{}", request.json ? comparison_json(comparison) : comparison_table(comparison));
   if (request.expect.empty() || request.expect == word(comparison.verdict)) return ExitCode::ok;
   fmt::print(stderr, "kphi: expected that they {}, found: {}\n", request.expect, word(comparison.verdict));
@@ -154,8 +217,7 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
       .add_option("--truth", request.truth,
                   "compare one RESULT with this file of kphi sim --truth; exit with 5 if it is far off")
       ->check(CLI::ExistingFile);
-  command.add_flag("--claims", request.claims,
-                   "check the paper's statements on two propellers (always done for three)");
+  command.add_flag("--claims", request.claims, "check the paper's statements on these propellers");
   add_value(command, "--predict", "DIAMETERxBLADES", request.predict,
             "predict k of a propeller that nobody measured, from three others; may be repeated")
       ->allow_extra_args(false);

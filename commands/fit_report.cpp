@@ -230,6 +230,8 @@ Json json_of(const Estimate& estimate) {
 /// Of a table that cannot fly: the line and its scatter, on screen alone.
 ExitCode run_table_line(const FitRequest& request, const FitInput& input, const std::string& obstacle) {
   refuse_for_table(request);
+  if (request.options.curve.loss != Loss::none)
+    throw ConfigurationError(request.path + ": " + obstacle + "; such a table takes no --curve-loss");
   const TableLine line = fit_table_line(input.table, request.options.curve.anchored);
   const char* verdict = words(Readiness::not_yet);
   if (request.json) {
@@ -395,6 +397,9 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_choice(command, "--weights", request.options.weighting, "how steps are weighted",
              {Weighting::equal, Weighting::thrust, Weighting::effective_variance});
   add_choice(command, "--loss", request.options.loss, "robust loss",
+             {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  add_choice(command, "--curve-loss", request.options.curve.loss,
+             "robust loss of the line, scaled by the error of each k",
              {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
   using compensation::OverlapMeasure;
   add_choice(command, "--overlap", request.options.overlap,

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -13,6 +15,8 @@
 #include "compensation/file/plausibility.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/logs/import_table.hpp"
+#include "fit/model/averaged_runs.hpp"
+#include "fit/model/table_line.hpp"
 #include "fit/uncertainty/readiness.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
@@ -126,6 +130,29 @@ FitInput campaign_input(const fs::path& path) {
   return input;
 }
 
+/// What a table does not tell, which counts as unknown and not as zero.
+void say_what_is_unknown(const std::vector<results::StepMean>& steps, const fs::path& path) {
+  if (averages_unknown(steps))
+    fmt::print(stderr,
+               "kphi: {}: averages of an unknown number of repetitions (no column repetitions_averaged): how these "
+               "scatter is unknown, and each row counts as one; fit the steps.csv beside it\n",
+               path.string());
+  if (std::ranges::any_of(steps, [](const auto& step) { return std::isnan(step.zero_n); }))
+    fmt::print(
+        stderr,
+        "kphi: {}: the zero that was subtracted from the thrust is unknown (no zero_n): how wrong it is, too, and "
+        "not in the ±\n",
+        path.string());
+}
+
+/// Of a table of k: repeated angles averaged, if a drone can fly on it then.
+std::vector<CurvePoint> averaged_table(std::vector<CurvePoint> table, const fs::path& path) {
+  const RepeatedAngles averaged = average_repeated(table);
+  if (averaged.angles == 0 || !obstacle_to_flight(averaged.points).empty()) return table;
+  fmt::print(stderr, "kphi: {}: {}\n", path.string(), averaged.words());
+  return averaged.points;
+}
+
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -133,7 +160,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   input.provenance.source = path.filename().string();
   const std::string text = results::read_text(path);
   if (is_k_table(text)) {
-    input.table = read_k_table(text, path.string(), unit_of_k);
+    input.table = averaged_table(read_k_table(text, path.string(), unit_of_k), path);
   } else {
     input.steps = results::parse_steps(text, path.string());
     input.provenance.origin = results::origin_of(input.steps);
@@ -141,6 +168,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
     const fs::path campaign = input.folder / "campaign.yaml";
     input.mounted_once =
         !fs::is_regular_file(campaign) || !profiles::load_campaign(campaign.string()).order.remount_each_repetition;
+    say_what_is_unknown(input.steps, path);
   }
   return input;
 }

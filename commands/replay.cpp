@@ -115,7 +115,8 @@ Replay replay_campaign(const CampaignFolder& folder) {
   replay.stored = folder.steps();
   replay.difference = difference(replay.table, results::read_text(folder.steps()));
   if (!replay.difference && is_unlike(folder.means(), means_of(replay.steps)))
-    replay.difference = "agrees, but means.csv beside it is not its average over the repetitions";
+    replay.difference =
+        "agrees, but means.csv beside it is not its average over the repetitions, or was written by an older kphi";
   if (!replay.difference && is_unlike(folder.references(), reduced(folder.reference_runs())))
     replay.difference = "agrees, but references.csv beside it differs from what its runs give";
   return replay;

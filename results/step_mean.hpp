@@ -101,9 +101,11 @@ struct StepMean {
   double lag_s = kNotMeasured;                 ///< the thrust shows so much later than the speed
   double lag_u_s = kNotMeasured;               ///< standard uncertainty
   std::uint64_t speed_glitches = 0;            ///< speeds left out
-  double repetitions_averaged = kNotMeasured;  ///< in an average from which repetitions were left out
+  double repetitions_averaged = kNotMeasured;  ///< this and the next three: of an average over repetitions alone
   double repetitions_left_out = kNotMeasured;
-  double simulated = kNotMeasured;  ///< 1: by a simulator; 0: by devices
+  double k_scatter_share = kNotMeasured;   ///< standard deviation of k from repetition to repetition of the occlusion
+  double thrust_scatter_n = kNotMeasured;  ///< that of the thrust at this step about the k of each repetition
+  double simulated = kNotMeasured;         ///< 1: by a simulator; 0: by devices
 };
 
 /// Simulated if one step is, measured if all are.

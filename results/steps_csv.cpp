@@ -60,8 +60,13 @@ const std::array kColumns{
     // averages
     StepColumn{"repetitions_averaged", &StepMean::repetitions_averaged, 4},
     StepColumn{"repetitions_left_out", &StepMean::repetitions_left_out, 4},
+    StepColumn{"k_scatter_share", &StepMean::k_scatter_share, 4},
+    StepColumn{"thrust_scatter_n", &StepMean::thrust_scatter_n, 4},
     // origin
     StepColumn{"simulated", &StepMean::simulated, 5}};
+
+/// A table that another program wrote may lack it.
+constexpr std::string_view kZeroColumn = "zero_n";
 
 using Columns = std::vector<StepColumn>;
 
@@ -234,7 +239,7 @@ Columns columns_named(const std::vector<std::string>& names) {
     columns.push_back(*found);
   }
   for (const StepColumn& required : columns_of(kNoGroups)) {
-    if (std::ranges::find(names, required.name) == names.end())
+    if (std::ranges::find(names, required.name) == names.end() && required.name != kZeroColumn)
       throw std::invalid_argument(
           fmt::format("column {} is missing; expected {}", required.name, header_of(columns_of(kNoGroups))));
   }
@@ -243,6 +248,7 @@ Columns columns_named(const std::vector<std::string>& names) {
 
 StepMean step_from(const std::vector<std::string>& fields, const Columns& columns) {
   StepMean step;
+  step.zero_n = kNotMeasured;  // unless there is the column
   for (std::size_t i = 0; i < fields.size(); ++i) {
     try {
       std::visit(Parse{step, fields[i]}, columns[i].field);

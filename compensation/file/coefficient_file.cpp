@@ -324,6 +324,7 @@ void read_fit(const Value& map, Coefficients::Fit& into) {
   into.k_by = map.text_at("k_by");
   into.weights = map.text_at("weights");
   into.loss = map.text_at("loss");
+  into.curve_loss = map.text_at("curve_loss");
   into.speed_range_rpm = read_range(map, "speed_range_rpm");
   for (const Value& run : map.list("leave_out")) {
     if (!run.node().IsScalar()) run.refuse("a run in `leave_out` is not a text", kFitAgain);

@@ -63,7 +63,7 @@ struct Coefficients {
   };
   /// How the coefficients were fitted, in the words of `kphi fit`; empty in a file that does not say.
   struct Fit {
-    std::string k_by, weights, loss;
+    std::string k_by, weights, loss, curve_loss;
     std::optional<std::pair<double, double>> speed_range_rpm;          ///< lowest and highest level fitted
     std::vector<std::string> leave_out;                                ///< "PHI:REPETITION:CAUSE"
     bool mounted_once = false;                                         ///< one mounting for all runs of an occlusion

@@ -147,8 +147,9 @@ std::string standard_block(const Analysis& analysis) {
 
 /// The options in `provenance.fit`, with which the same can be fitted again.
 std::string fit_options(const Identification& identification, const std::optional<BenchUncertainty>& bench) {
-  std::string text = fmt::format("k_by: {}, weights: {}, loss: {}", name_of(identification.options.estimator),
-                                 name_of(identification.options.weighting), name_of(identification.options.loss));
+  std::string text = fmt::format("k_by: {}, weights: {}, loss: {}, curve_loss: {}",
+                                 name_of(identification.options.estimator), name_of(identification.options.weighting),
+                                 name_of(identification.options.loss), name_of(identification.options.curve.loss));
   if (speeds_known(identification)) {
     text += ", speed_range_rpm: " + speed_range(identification.fitted.min_rad_s, identification.fitted.max_rad_s);
   }
@@ -241,7 +242,9 @@ Enum named(const std::string& name, const char* key, const std::string& path, co
 std::string estimator_words(const Identification& identification) {
   const bool from_steps = !identification.table.empty() && identification.table.front().fit.has_value();
   const char* const form = identification.options.curve.form == CurveForm::table ? "table" : "weighted line";
-  if (!from_steps) return fmt::format("a {} through given k(phi)", form);
+  const Loss curve_loss = identification.options.curve.loss;
+  const std::string by = curve_loss == Loss::none ? "" : fmt::format(", {} loss", name_of(curve_loss));
+  if (!from_steps) return fmt::format("a {} through given k(phi){}", form, by);
   constexpr std::array<const char*, 4> words{
       "least squares of T on w^2 through the origin", "least squares of T on w^2 with an offset",
       "T/w^2 at the reference speed, by least squares of T on w^2, w and 1", "mean T/w^2 at the reference speed"};
@@ -250,7 +253,7 @@ std::string estimator_words(const Identification& identification) {
     text += fmt::format(", weighted by {}",
                         identification.options.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
   if (identification.options.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.options.loss));
-  return text + fmt::format(", then a {} through k(phi)", form);
+  return text + fmt::format(", then a {} through k(phi){}", form, by);
 }
 
 std::string format_coefficients(const Fitted& fitted, const Provenance& provenance) {
@@ -289,7 +292,9 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.mounted_once = fit.mounted_once;
   record.limits = {file.thrust_error.fit_to_fly.value_or(record.limits.fit_to_fly),
                    file.thrust_error.with_care.value_or(record.limits.with_care)};
-  options.loss = named(fit.loss, "loss", path, std::array{Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
+  constexpr std::array kLosses{Loss::none, Loss::huber, Loss::cauchy, Loss::tukey};
+  options.loss = named(fit.loss, "loss", path, kLosses);
+  options.curve.loss = named(fit.curve_loss, "curve_loss", path, kLosses);
   for (const std::string& run : fit.leave_out) options.left_out.push_back(parse_left_out_run(run));
   if (!fit.bench) return record;
   record.bench.emplace();

@@ -69,6 +69,23 @@ std::vector<CurvePoint> carriers(const std::vector<CurvePoint>& points, const Cu
   return used;
 }
 
+/// Without its error nobody can say how far a point is from the curve.
+void require_loss_to_fit(const CurveOptions& options, const std::vector<CurvePoint>& used) {
+  if (options.loss == Loss::none) return;
+  if (!model_of(options.form).can_have_loss())
+    throw FitError(
+        fmt::format("{0} fit: a {0} passes through its points and has no robust loss; fit a line, or leave "
+                    "--curve-loss away",
+                    name_of(options.form)));
+  for (const CurvePoint& point : used) {
+    if (!(point.standard_error > 0))
+      throw FitError(
+          fmt::format("{} fit: the error of k at phi = {}° is unknown, and the {} loss is scaled by it; "
+                      "give it in a column u_k_…, or leave --curve-loss away",
+                      name_of(options.form), point.phi_deg, name_of(options.loss)));
+  }
+}
+
 double largest_k(const std::vector<CurvePoint>& points, const char* form) {
   double largest = 0;
   for (const CurvePoint& point : points) largest = std::max(largest, std::abs(point.k));
@@ -137,16 +154,20 @@ CurveFit fit_curve(std::span<const CurvePoint> points, const CurveOptions& optio
         fmt::format("{} fit: no run at phi = 0; K_T is measured without an occlusion on the same stand", form));
 
   const bool anchored = model_of(options.form).anchored(options.anchored);
-  CurveFit fit{.form = options.form, .anchored = anchored, .K_T = all.front().k};
+  CurveFit fit{.form = options.form, .anchored = anchored, .loss = options.loss, .K_T = all.front().k};
   const double floor = kErrorFloor * largest_k(all, form);
   const auto known_error = [&](const CurvePoint& point) {
     return point.standard_error > 0 ? point.standard_error : floor;
   };
   fit.K_T_standard_error = known_error(all.front());
   fit.points = carriers(all, options);
+  require_loss_to_fit(options, fit.points);
   for (const CurvePoint& point : fit.points) fit.sigmas.push_back(std::max(known_error(point), floor));
   fit.parameters = model_of(options.form).parameters(fit, all);
-  for (const CurvePoint& point : fit.points) fit.residuals.push_back(point.k - fit.k_at(point.phi_deg));
+  for (std::size_t i = 0; i < fit.points.size(); ++i) {
+    fit.residuals.push_back(fit.points[i].k - fit.k_at(fit.points[i].phi_deg));
+    fit.robust_weights.push_back(robust_weight(fit.loss, fit.residuals[i] / fit.sigmas[i]));
+  }
   return fit;
 }
 

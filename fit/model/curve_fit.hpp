@@ -13,6 +13,7 @@
 
 #include "compensation/thrust_curve.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
+#include "fit/numerics/loss.hpp"
 
 namespace kphi::fit {
 
@@ -47,6 +48,7 @@ struct CurveOptions {
   CurveForm form = CurveForm::line;
   bool anchored = false;             ///< k(0) of the curve is K_T
   std::vector<double> points_deg{};  ///< which points carry the curve; empty: all with φ > 0
+  Loss loss = Loss::none;            ///< of a line; σ of each point is its error
 };
 
 /// One parameter of the curve.
@@ -55,7 +57,8 @@ struct CurveParameter {
   std::string name;  ///< for people
   std::string per;   ///< what follows the unit of k: "", "/deg"
   double value = 0;
-  /// The value is Σ weight · k over all the points given to the fit, ascending φ, with the weights of the fit.
+  /// The value is Σ weight · k over all the points given to the fit, ascending φ, with the weights of the fit, those of
+  /// its loss included.
   std::vector<double> weights{};
   std::optional<double> at_deg{};  ///< of a k in a table: its φ
 };
@@ -66,11 +69,13 @@ class CurveModel;
 struct CurveFit {
   CurveForm form = CurveForm::line;
   bool anchored = false;  ///< k(0) of the curve is K_T
+  Loss loss = Loss::none;
   std::vector<CurveParameter> parameters{};
-  std::vector<CurvePoint> points{};  ///< used, ascending φ
-  std::vector<double> residuals{};   ///< k − curve, N/(rad/s)², one per point used
-  std::vector<double> sigmas{};      ///< the errors by which the points were weighted
-  double K_T = 0;                    ///< N/(rad/s)², measured at φ = 0
+  std::vector<CurvePoint> points{};      ///< used, ascending φ
+  std::vector<double> residuals{};       ///< k − curve, N/(rad/s)², one per point used
+  std::vector<double> sigmas{};          ///< the errors by which the points were weighted
+  std::vector<double> robust_weights{};  ///< 1: full weight, 0: ignored; one per point used
+  double K_T = 0;                        ///< N/(rad/s)², measured at φ = 0
   double K_T_standard_error = 0;
 
   /// The curve that flies up to `largest_deg` (default: the last point), without its uncertainty, which Analysis has.
@@ -112,7 +117,9 @@ class CurveModel {
   [[nodiscard]] virtual std::size_t least_points(bool anchored) const = 0;
   /// How many it can hold.
   [[nodiscard]] virtual std::size_t most_points() const { return std::numeric_limits<std::size_t>::max(); }
-  /// Of a fit with points and sigmas; `all` are those given to the fit, ascending φ.
+  /// Whether it can be fitted under a robust loss.
+  [[nodiscard]] virtual bool can_have_loss() const { return false; }
+  /// Of a fit with points, sigmas and loss; `all` are those given to the fit, ascending φ.
   [[nodiscard]] virtual std::vector<CurveParameter> parameters(const CurveFit& fit,
                                                                std::span<const CurvePoint> all) const = 0;
   /// k(φ) = Σ basis · value over the parameters.
@@ -149,7 +156,8 @@ inline constexpr double kSameAngleDeg = 1e-6;
 [[nodiscard]] const CurveModel& table_model();
 
 /// `points` hold exactly one φ = 0 (K_T) and the occluded ones, each φ once. Throws FitError when K_T is missing, a φ
-/// is listed twice or not measured, or too few points remain for the form.
+/// is listed twice or not measured, or too few points remain for the form; with a loss when the form has none or the
+/// error of a point is unknown.
 [[nodiscard]] CurveFit fit_curve(std::span<const CurvePoint> points, const CurveOptions& options = {});
 
 }  // namespace kphi::fit

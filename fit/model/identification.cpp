@@ -11,6 +11,7 @@
 #include "base/error.hpp"
 #include "base/text.hpp"
 #include "compensation/units.hpp"
+#include "fit/model/averaged_runs.hpp"
 #include "results/reduction/run_zero.hpp"
 
 namespace kphi::fit {
@@ -64,6 +65,7 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   row.standard_error = row.fit->standard_error.k;
   row.steps = levels.size();
   row.repetitions = repetitions.size();
+  if (const auto averaged = repetitions_averaged(steps)) row.repetitions = static_cast<std::size_t>(*averaged);
   if (!at_level.empty()) row.at_speed = k_at_speed(at_level);
   if (options.estimator == Estimator::polynomial || options.estimator == Estimator::at_speed) {
     if (!row.at_speed) throw FitError("no good step at the reference speed; name a speed of the profile");
@@ -77,12 +79,18 @@ OcclusionCoefficient coefficient(double phi_deg, std::vector<StepMean> steps, co
   return row;
 }
 
+AveragedRuns runs_of(const OcclusionCoefficient& row, const ThrustFit& fit, const results::ZeroMovement& movement) {
+  if (auto averaged = averaged_runs(row.phi_deg, row.measured, fit, row.k, movement)) return *std::move(averaged);
+  AveragedRuns measured{sums_of_runs(row.phi_deg, row.measured, fit, row.k, movement), {}};
+  measured.within = scatter_within_runs(row.measured, fit, row.k, measured.runs);
+  return measured;
+}
+
 /// For "k at a speed" only the steps at that speed; otherwise all steps, with the weights of the fit.
 AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, double at_speed,
                         const results::ZeroMovement& movement) {
   if (estimator != Estimator::at_speed) {
-    auto runs = sums_of_runs(row.phi_deg, row.measured, *row.fit, row.k, movement);
-    WithinRuns within = scatter_within_runs(row.measured, *row.fit, row.k, runs);
+    auto [runs, within] = runs_of(row, *row.fit, movement);
     if (estimator != Estimator::through_origin) {
       // The other terms of the map are fitted too, and their errors are part of the error of k.
       within.variance = row.standard_error * row.standard_error * static_cast<double>(runs.size());
@@ -98,7 +106,7 @@ AngleScatter scatter_of(const OcclusionCoefficient& row, Estimator estimator, do
     at_level.points[i].weight = there ? 1 / (square * square) : 0;
     at_level.robust_weights[i] = 1;
   }
-  return scatter_of_angle(row.k, sums_of_runs(row.phi_deg, row.measured, at_level, row.k, movement), {});
+  return scatter_of_angle(row.k, runs_of(row, at_level, movement).runs, {});
 }
 
 void require_one_propeller(std::span<const StepMean> steps) {
@@ -172,11 +180,6 @@ const char* name_of(Estimator estimator) {
 const char* name_of(Weighting weighting) {
   constexpr std::array<const char*, 3> names{"equal", "thrust", "effective-variance"};
   return names[static_cast<std::size_t>(weighting)];
-}
-
-const char* name_of(Loss loss) {
-  constexpr std::array<const char*, 4> names{"none", "huber", "cauchy", "tukey"};
-  return names[static_cast<std::size_t>(loss)];
 }
 
 std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> steps, const IdentificationOptions& options,

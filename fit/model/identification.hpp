@@ -93,11 +93,9 @@ struct Identification {
 /// Whether two speeds are the same level of a profile: they agree to 0.5 %.
 [[nodiscard]] bool same_level(double a_rad_s, double b_rad_s);
 
-/// Names for options and files: "origin", "offset", "polynomial", "speed"; "equal", "thrust", "effective-variance";
-/// "none", "huber", "cauchy", "tukey".
+/// Names for options and files: "origin", "offset", "polynomial", "speed"; "equal", "thrust", "effective-variance".
 [[nodiscard]] const char* name_of(Estimator estimator);
 [[nodiscard]] const char* name_of(Weighting weighting);
-[[nodiscard]] const char* name_of(Loss loss);
 
 /// One row per φ of `steps`, ascending, and how they repeat. `at_speed_rad_s` is the reference speed, 0: none. Throws
 /// FitError, naming φ.

@@ -78,7 +78,8 @@ std::vector<Point> points_of(std::span<const results::StepMean> steps) {
   const bool speed_told = all_tell(&results::StepMean::speed_u_rad_s);
   std::vector<Point> points;
   for (const results::StepMean& step : steps) {
-    points.push_back({step.speed_rad_s, step.thrust_n, 1,
+    const bool averages = step.repetition == 0 && step.repetitions_averaged > 0;
+    points.push_back({step.speed_rad_s, step.thrust_n, averages ? step.repetitions_averaged : 1,
                       thrust_told ? step.thrust_u_n : mean_uncertainty(step.thrust_sd_n, step.thrust_samples),
                       speed_told ? step.speed_u_rad_s : mean_uncertainty(step.speed_sd_rad_s, step.speed_n)});
   }

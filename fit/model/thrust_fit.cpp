@@ -82,15 +82,6 @@ void weigh(std::vector<Point>& points, Weighting weighting, const ThrustParamete
   for (Point& point : points) point.weight *= static_cast<double>(points.size()) / sum;
 }
 
-/// `sigma` in units of the residuals. Null for 0: points without scatter have no outliers.
-std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
-  if (!(sigma > 0)) return nullptr;
-  if (loss == Loss::huber) return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
-  if (loss == Loss::cauchy) return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
-  if (loss == Loss::tukey) return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
-  return nullptr;
-}
-
 /// Thrust and speed scaled to at most 1; every solution starts from the last one.
 class Fitter {
  public:

@@ -11,6 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "fit/numerics/loss.hpp"
+
 namespace kphi::fit {
 
 /// T = k ω² + linear ω + offset. The paper's model (equations 2 and 3) is k alone; flight stacks also use all three
@@ -50,19 +52,10 @@ enum class Weighting : std::uint8_t {
   effective_variance,  ///< 1/(u²(T) + (dT/dω)² u²(ω)): with the errors of the speed (Orear 1982)
 };
 
-/// Influence of a point far from the fit. Tuned to 95 % efficiency under normal errors, scaled by the median absolute
-/// deviation.
-enum class Loss : std::uint8_t {
-  none,
-  huber,   ///< constant beyond 1.345 σ
-  cauchy,  ///< falls beyond 2.385 σ
-  tukey,   ///< zero beyond 4.685 σ
-};
-
 struct ThrustFitOptions {
   ThrustForm form = ThrustForm::through_origin;
   Weighting weighting = Weighting::equal;
-  Loss loss = Loss::none;
+  Loss loss = Loss::none;  ///< scaled by the median absolute deviation
 };
 
 struct ThrustFit {
@@ -81,9 +74,6 @@ struct ThrustFit {
   std::vector<double> robust_weights;  ///< 1: full weight, 0: ignored; one per point used
   std::vector<double> residuals_n;     ///< T − thrust(parameters, ω), one per point used
 };
-
-/// A point with a smaller robust weight counts as rejected and is listed.
-inline constexpr double kRejectedWeight = 0.25;
 
 /// Throws FitError when there are fewer points than free terms + 1, when a number is not finite, a
 /// weight not positive, an uncertainty missing that `weighting` needs, or the points too alike to fit all terms.

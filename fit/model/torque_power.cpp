@@ -23,6 +23,7 @@ std::vector<results::StepMean> torque_steps(std::span<const results::StepMean> s
     step.thrust_sd_n = step.torque_sd_nm;
     step.thrust_u_n = step.torque_sd_nm / std::sqrt(step.thrust_n_eff);
     step.zero_n = step.zero_u_n = step.zero_moved_n = std::numeric_limits<double>::quiet_NaN();
+    step.k_scatter_share = step.thrust_scatter_n = std::numeric_limits<double>::quiet_NaN();
     result.push_back(std::move(step));
   }
   return result;

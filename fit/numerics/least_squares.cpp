@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <memory>
 
 #include "base/error.hpp"
@@ -26,6 +27,27 @@ ceres::Problem::Options problem_options() {
   options.context = context.get();
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   return options;
+}
+
+std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma) {
+  if (!(sigma > 0)) return nullptr;
+  if (loss == Loss::huber) return std::make_unique<ceres::HuberLoss>(1.345 * sigma);
+  if (loss == Loss::cauchy) return std::make_unique<ceres::CauchyLoss>(2.385 * sigma);
+  if (loss == Loss::tukey) return std::make_unique<ceres::TukeyLoss>(4.685 * sigma);
+  return nullptr;
+}
+
+const char* name_of(Loss loss) {
+  constexpr std::array<const char*, 4> names{"none", "huber", "cauchy", "tukey"};
+  return names[static_cast<std::size_t>(loss)];
+}
+
+double robust_weight(Loss loss, double deviation) {
+  const auto function = loss_function(loss, 1);
+  if (!function) return 1;
+  std::array<double, 3> rho{};
+  function->Evaluate(deviation * deviation, rho.data());
+  return rho[1];
 }
 
 void solve_exactly(ceres::Problem& problem, const char* what, int iterations) {

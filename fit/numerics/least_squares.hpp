@@ -3,13 +3,20 @@
 
 #include <ceres/ceres.h>
 
+#include <memory>
 #include <vector>
+
+#include "fit/numerics/loss.hpp"
 
 namespace kphi::fit {
 
 /// Options with one shared context: a context per problem would start a thread each. The caller owns the loss
 /// functions.
 [[nodiscard]] ceres::Problem::Options problem_options();
+
+/// `sigma` of the points, in units of the residuals. nullptr without a loss or for 0: points without scatter have no
+/// outliers.
+[[nodiscard]] std::unique_ptr<ceres::LossFunction> loss_function(Loss loss, double sigma);
 
 /// Solves to rounding (the problems here are linear and scaled to about 1) and prints nothing. Throws FitError, naming
 /// `what`, when Ceres does not converge. One iteration is enough for a start.

@@ -244,18 +244,27 @@ FamilyFindings findings_of(std::span<const Fitted> family, std::span<const Prope
   return findings;
 }
 
-std::string family_text(const FamilyFindings& findings) {
+namespace {
+
+std::string claims_text(std::span<const Claim> claims) {
   std::string text = fmt::format("{:<11} {:>14}  the paper's statement; a test rejects it where p is below {}\n",
                                  "verdict", "p, lack of fit", kTestLevel);
-  for (const Claim& claim : findings.claims)
+  for (const Claim& claim : claims)
     if (claim.is_p) text += test_line(claim);
   text += fmt::format("\n{:<11} {:>12} {:>24} {:>24}  {:<9} {}\n", "verdict", "found", "95 %", "allowed", "unit",
                       "the paper's statement");
-  for (const Claim& claim : findings.claims)
+  for (const Claim& claim : claims)
     if (!claim.is_p) text += claim_line(claim);
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string family_text(const FamilyFindings& findings) {
+  std::string text = findings.claims.empty() ? "" : claims_text(findings.claims);
   text += findings.air == Air::standard
-              ? "\nPropellers are compared in standard air, 1.225 kg/m3.\n"
-              : "\nPropellers are compared in the air of their days: some densities are unknown.\n";
+              ? "Propellers are compared in standard air, 1.225 kg/m3.\n"
+              : "Propellers are compared in the air of their days: some densities are unknown.\n";
   if (!findings.slopes.empty()) text += "\nOne slope for each diameter\n";
   for (const SharedSlope& one : findings.slopes) text += slope_line(one);
   if (!findings.predictions.empty()) text += "\nPrediction for propellers that were not measured\n";

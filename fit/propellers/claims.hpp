@@ -56,7 +56,7 @@ struct FamilyFindings {
 /// with fewer than three members.
 [[nodiscard]] FamilyFindings findings_of(std::span<const Fitted> family, std::span<const PropellerSize> sizes);
 
-/// Claim, value found, 95 % interval, verdict; then slopes and predictions.
+/// Claim, value found, 95 % interval, verdict, unless there are no claims; then slopes and predictions.
 [[nodiscard]] std::string family_text(const FamilyFindings& findings);
 
 }  // namespace kphi::fit

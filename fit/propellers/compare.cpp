@@ -15,13 +15,10 @@
 #include "base/text.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
-#include "fit/model/step_selection.hpp"
-#include "fit/model/thrust_fit.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/file_layer.hpp"
 #include "results/reduction/bin_statistics.hpp"
-#include "results/steps_csv.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -58,25 +55,6 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
     add(parameter.key.substr(0, per), per == std::string::npos ? kUnit : "N/(rad/s)^2 per degree", parameter.value,
         parameter.uncertainty, false);
   }
-  return result;
-}
-
-/// K_T alone, of steps without occlusion.
-ComparedResult result_of_steps(const std::string& file, const std::string& name) {
-  const auto steps = results::read_steps(file);
-  std::vector<Point> points;
-  for (const results::StepMean& step : select_steps(steps, {}).used)
-    if (step.occlusion_deg == 0) points.push_back({step.speed_rad_s, step.thrust_n, 1});
-  if (points.empty()) throw FitError(file + ": no good step without occlusion");
-  const ThrustFit fit = fit_thrust(points);
-  ComparedResult result;
-  result.name = name;
-  result.origin = results::origin_of(steps);
-  result.propeller = printable(steps.front().propeller);
-  result.diameter_in = steps.front().diameter_in;
-  result.speed_min_rad_s = fit.speed_min_rad_s;
-  result.speed_max_rad_s = fit.speed_max_rad_s;
-  result.estimates.push_back({"K_T", kUnit, fit.parameters.k, fit.standard_error.k});
   return result;
 }
 
@@ -191,24 +169,33 @@ std::string probability(const std::optional<double>& p) {
 }  // namespace
 
 ComparedResult load_result(const std::string& path) {
-  const fs::path place(path);
-  const fs::path coefficients = fs::is_directory(place) ? place / "coefficients.yaml" : place;
-  const fs::path steps = fs::is_directory(place) ? place / "steps.csv" : place;
-  const fs::path folder = fs::is_directory(place) ? place : place.has_parent_path() ? place.parent_path() : ".";
+  const fs::path file = fs::is_directory(path) ? fs::path(path) / "coefficients.yaml" : fs::path(path);
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   if (fs::exists(folder / "journal.jsonl")) results::require_intact(results::CampaignFolder::open(folder));
-  if (!fs::is_directory(place) && place.extension() == ".csv") return result_of_steps(path, path);
-  if (fs::exists(coefficients)) {
-    const compensation::Coefficients file = compensation::load_coefficients(coefficients.string());
-    results::require_seal(results::read_text(coefficients), coefficients.string());
-    return result_of(file, path);
-  }
-  if (!fs::exists(steps))
-    throw ConfigurationError(
-        path + ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name another folder");
-  const auto table = results::read_steps(steps);
-  if (std::ranges::any_of(table, [](const auto& step) { return step.occlusion_deg > 0; }))
-    throw ConfigurationError(path + ": not fitted yet; run `kphi fit " + path + "` first");
-  return result_of_steps(steps.string(), path);
+  if (!fs::exists(file))
+    throw ConfigurationError(fs::exists(folder / "steps.csv")
+                                 ? path + ": not fitted yet; run `kphi fit " + path + "` first"
+                                 : path +
+                                       ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name "
+                                       "another folder");
+  const compensation::Coefficients coefficients = compensation::load_coefficients(file.string());
+  results::require_seal(results::read_text(file), file.string());
+  return result_of(coefficients, path);
+}
+
+ComparedResult result_of_log(const Fitted& fitted, Origin origin, const std::string& name) {
+  const Identification& found = fitted.identification;
+  const Budget& K_T = fitted.analysis.coefficients.front();
+  ComparedResult result;
+  result.name = name;
+  result.origin = origin;
+  result.propeller = printable(found.propeller);
+  result.diameter_in = found.diameter_in;
+  result.speed_min_rad_s = found.speed_min_rad_s;
+  result.speed_max_rad_s = found.speed_max_rad_s;
+  result.air = found.air;
+  result.estimates.push_back({"K_T", kUnit, K_T.value, K_T.combined(), true, K_T.freedom()});
+  return result;
 }
 
 Comparison compare(ComparedResult a, ComparedResult b) {

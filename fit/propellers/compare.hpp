@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "fit/numerics/hypothesis_test.hpp"
+#include "fit/uncertainty/analysis.hpp"
 
 namespace kphi::fit {
 
@@ -31,10 +32,12 @@ struct ComparedResult {
   std::vector<ComparedValue> estimates;
 };
 
-/// A coefficients.yaml, a campaign folder with one, or a folder or steps.csv without occlusions (K_T alone). Standard
-/// uncertainties are those of the file, by the GUM; of a table of steps the standard error of the fit. Throws
-/// ConfigurationError, compensation::CoefficientError or FitError.
+/// A coefficients.yaml, or a folder with one. Standard uncertainties are those of the file, by the GUM. Throws
+/// ConfigurationError or compensation::CoefficientError.
 [[nodiscard]] ComparedResult load_result(const std::string& path);
+
+/// Of steps without occlusion: K_T alone, with its budget.
+[[nodiscard]] ComparedResult result_of_log(const Fitted& fitted, Origin origin, const std::string& name);
 
 struct Difference {
   std::string name;

@@ -178,6 +178,7 @@ Json fit_json(const Identification& identification, const Analysis& analysis,
           {"estimator", name_of(identification.options.estimator)},
           {"weights", name_of(identification.options.weighting)},
           {"loss", name_of(identification.options.loss)},
+          {"curve_loss", name_of(identification.options.curve.loss)},
           {"analysis", analysis}};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 
 namespace kphi::results {
 namespace {
@@ -123,6 +124,24 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::s
   return from + static_cast<std::size_t>(std::ranges::partition_point(counts, earlier) - counts.begin());
 }
 
+namespace {
+
+/// The line goes through the midst of the least delayed records: some of them arrived some µs before it. What is off by
+/// more has a stamp of a clock that stepped.
+void hold_before_arrivals(const LoadCellColumns& cell, std::vector<Nanoseconds>& times) {
+  constexpr Nanoseconds kMostOfALine = 1'000'000;
+  Nanoseconds next = std::numeric_limits<Nanoseconds>::max();
+  auto datagram = cell.datagrams.rbegin();
+  for (std::size_t i = times.size(); i-- > 0;) {
+    while (std::next(datagram) != cell.datagrams.rend() && std::next(datagram)->end > i) ++datagram;
+    if (const Nanoseconds late = times[i] - datagram->arrival_ns; late > 0 && late < kMostOfALine)
+      times[i] = datagram->arrival_ns;
+    next = times[i] = std::min(times[i], next - 1);
+  }
+}
+
+}  // namespace
+
 std::vector<Nanoseconds> sample_times(const RunRecording& run, const LoadCellColumns& cell) {
   std::vector<Nanoseconds> times;
   times.reserve(cell.ft_sequence.size());
@@ -134,6 +153,7 @@ std::vector<Nanoseconds> sample_times(const RunRecording& run, const LoadCellCol
     for (const auto& [end, arrival_ns] : cell.datagrams) times.resize(end, arrival_ns);
   }
   for (std::size_t i = 1; i < times.size(); ++i) times[i] = std::max(times[i], times[i - 1] + 1);
+  hold_before_arrivals(cell, times);
   return times;
 }
 

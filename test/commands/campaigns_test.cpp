@@ -305,6 +305,7 @@ TEST_F(CampaignOfSomebody, GivesNoResultOnceARunHasChanged) {
                                              {"report", folder},
                                              {"compare", campaign_.string(), folder},
                                              {"export", folder, "--to", "ros2"},
+                                             {"check", coefficients},
                                              {"compensate", "--coefficients", coefficients, "--vehicle", vehicle},
                                              {"pack", folder, "--out", zip_.string()}}) {
     const Answer answer = say(verb);
@@ -315,6 +316,30 @@ TEST_F(CampaignOfSomebody, GivesNoResultOnceARunHasChanged) {
   }
   EXPECT_EQ(results::read_text(coefficients), before);
   EXPECT_EQ(results::read_text(folder_ / "report.html"), report);
+}
+
+TEST_F(CampaignOfSomebody, GivesNoResultOnceItsTableWasEdited) {
+  const fs::path table = folder_ / "steps.csv";
+  std::string text = results::read_text(table);
+  char& digit = text.at(text.find('.', text.find('\n')) + 1);
+  digit = digit == '1' ? '2' : '1';
+  fs::permissions(table, fs::perms::owner_write, fs::perm_options::add);
+  std::ofstream(table) << text;
+  const std::string folder = folder_.string(), coefficients = (folder_ / "coefficients.yaml").string();
+  const std::string vehicle = source_dir() + "/profiles/foldable_drone.yaml";
+  for (const std::vector<std::string>& verb :
+       std::vector<std::vector<std::string>>{{"fit", folder},
+                                             {"report", folder},
+                                             {"compare", campaign_.string(), folder},
+                                             {"export", folder, "--to", "ros2"},
+                                             {"check", coefficients},
+                                             {"compensate", "--coefficients", coefficients, "--vehicle", vehicle}}) {
+    const Answer answer = say(verb);
+    EXPECT_EQ(answer.code, 5) << verb[0];
+    EXPECT_EQ(answer.out, "") << verb[0];
+    EXPECT_THAT(answer.err, HasSubstr("steps.csv")) << verb[0];
+    EXPECT_EQ(std::ranges::count(answer.err, '\n'), 1) << answer.err;
+  }
 }
 
 TEST_F(CampaignOfSomebody, SaysWhichOfItsRunsIsMissing) {

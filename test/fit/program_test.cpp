@@ -3,14 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <tuple>
 
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
 #include "results/file_layer.hpp"
+#include "results/reduction/step_averages.hpp"
 #include "results/steps_csv.hpp"
 #include "test/end_to_end/process.hpp"
 #include "test/fit/bench_study.hpp"
@@ -73,7 +76,8 @@ TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
   const std::string config = steps("5x3");
   const std::vector<std::vector<std::string>> ways{
       {"--u", "calibration=0.004", "--u", "alignment-deg=1.5", "--u", "clock=2e-5"},
-      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180"},
+      {"--loss", "huber", "--weights", "thrust", "--estimator", "offset", "--anchored", "--points", "45,180",
+       "--curve-loss", "cauchy"},
       {"--leave-out", "90:2:plate slipped", "--propeller", "mine", "--at-speed-rpm", "19100"}};
   for (std::vector<std::string> way : ways) {
     way.insert(way.begin(), {"fit", config});
@@ -83,6 +87,29 @@ TEST_F(FitProgram, DrawsTheReportOfTheFitAgainByteForByte) {
     ASSERT_EQ(kphi({"report", config}).code, 0);
     EXPECT_TRUE(results::read_text(config + "/report.html") == page) << way[2];
   }
+}
+
+TEST_F(FitProgram, FitsTheMeansOfACampaignAsItsSteps) {
+  const std::string folder = steps("5x3");
+  auto means = results::means_of(results::read_steps(folder + "/steps.csv"));
+  results::write_steps(folder + "/means.csv", means);
+  const auto fitted = [&](const std::string& table) {
+    const Answer answer = kphi(
+        {"fit", folder + "/" + table, "--json", "--no-report", "--accept", "--out", folder + "/" + table + ".yaml"});
+    EXPECT_EQ(answer.code, 0) << answer.err;
+    return std::pair(json::parse(answer.out), answer.err);
+  };
+  const auto [of_steps, said_of_steps] = fitted("steps.csv");
+  const auto [of_means, said_of_means] = fitted("means.csv");
+  EXPECT_NEAR(of_means["K_T"].get<double>() / of_steps["K_T"].get<double>(), 1, 1e-6);
+  EXPECT_NEAR(of_means["K_T_expanded_95"].get<double>() / of_steps["K_T_expanded_95"].get<double>(), 1, 0.3)
+      << "of one campaign, whose zeros do not tell how far they moved";
+  EXPECT_THAT(results::read_text(folder + "/means.csv.yaml"), HasSubstr("repetitions: 3"));
+  EXPECT_THAT(said_of_means, Not(HasSubstr("unknown number")));
+  for (auto& row : means)
+    row.repetitions_averaged = row.repetitions_left_out = row.k_scatter_share = row.thrust_scatter_n = std::nan("");
+  results::write_steps(folder + "/means.csv", means);
+  EXPECT_THAT(fitted("means.csv").second, HasSubstr("averages of an unknown number of repetitions"));
 }
 
 TEST_F(FitProgram, HandsTheOverlapMeasureToWhoFlies) {
@@ -109,7 +136,11 @@ TEST_F(FitProgram, ComparesAFamilyFromItsFolders) {
   std::vector<std::string> words{"compare", places[0], places[1], places[2], places[3]};
   const Answer table = kphi(words);
   EXPECT_EQ(table.code, 0) << table.err;
-  EXPECT_THAT(table.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));
+  EXPECT_THAT(table.out, AllOf(Not(HasSubstr("the paper's statement")), HasSubstr("One slope")));
+  words.emplace_back("--claims");
+  const Answer claims = kphi(words);
+  EXPECT_EQ(claims.code, 0) << claims.err;
+  EXPECT_THAT(claims.out, AllOf(HasSubstr("holds"), HasSubstr("the paper's statement"), HasSubstr("One slope")));
   words.insert(words.end(), {"--predict", "7x3", "--json"});
   const json found = json::parse(kphi(words).out);
   EXPECT_EQ(found.at("claims").size(), 16u);
@@ -119,6 +150,36 @@ TEST_F(FitProgram, ComparesAFamilyFromItsFolders) {
   expect_refused({"compare", places[0], places[1], places[2], "--predict", "seven"}, 2, "such as 7x3");
   expect_refused({"compare", places[0], places[1], places[2], "--expect", "agree"}, 2, "two results");
   expect_refused({"compare", places[0]}, 2, "RESULT");
+}
+
+TEST_F(FitProgram, ComparesLogsOverTheSpeedsOfBoth) {
+  // k of this propeller rises by 6 % over the speeds; one log has the slow half of them, the other the fast.
+  std::vector<std::string> logs;
+  for (const auto& [name, from, to] : {std::tuple("slow", 3000.0, 12000.0), std::tuple("fast", 8000.0, 20000.0)}) {
+    StudyTruth rising;
+    rising.rise = 0.06;
+    rising.calibration = rising.density = rising.clock = 0;
+    auto all = study_campaign(rising, 7).steps;
+    std::erase_if(all, [&, from = from, to = to](const results::StepMean& step) {
+      const double rpm = to_rpm(RadPerSec(step.commanded_speed_rad_s));
+      return step.occlusion_deg > 0 || rpm < from || rpm > to;
+    });
+    std::filesystem::create_directories(folder_ / name);
+    results::write_steps(folder_ / (std::string(name) + "/steps.csv"), all);
+    logs.push_back((folder_ / name).string());
+  }
+  const Answer answer = kphi({"compare", logs[0], logs[1], "--json"});
+  ASSERT_EQ(answer.code, 0) << answer.err;
+  const json found = json::parse(answer.out);
+  EXPECT_NEAR(found["differences"][0]["share"].get<double>(), 0, 1e-9) << "the same steps, where both have them";
+  EXPECT_THAT(answer.out, HasSubstr("which both reached"));
+  const json slow = json::parse(kphi({"fit", logs[0], "--json", "--no-report"}).out),
+             fast = json::parse(kphi({"fit", logs[1], "--json", "--no-report"}).out);
+  EXPECT_GT(fast["K_T"].get<double>() / slow["K_T"].get<double>(), 1.01) << "or there was nothing to mend";
+  const json alone = json::parse(kphi({"compare", logs[0], logs[0], "--json"}).out);
+  EXPECT_NEAR(alone["differences"][0]["a"].get<double>() / slow["k_standard"].get<double>(), 1, 1e-12)
+      << "a fit and a comparison give one number";
+  EXPECT_THAT(kphi({"compare", logs[0], steps("5x3")}).err, HasSubstr("not fitted yet"));
 }
 
 TEST_F(FitProgram, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
@@ -303,12 +364,46 @@ TEST_F(FitProgram, FitsTheLinesThatNistCertified) {
   }
 }
 
+TEST_F(FitProgram, AveragesTheRowsOfATableThatNamesAnAngleTwice) {
+  const std::string table =
+      file("twice.csv",
+           "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n0,1.503e-6\n90,1.201e-6\n90,1.199e-6\n180,8.99e-7\n"
+           "180,9.01e-7\n270,6.01e-7\n270,6e-7\n");
+  const std::string out = (folder_ / "twice.yaml").string();
+  const Answer twice = kphi({"fit", table, "--no-report", "--accept", "--out", out});
+  EXPECT_EQ(twice.code, 0) << twice.err;
+  EXPECT_THAT(twice.err,
+              HasSubstr("4 of 4 angles are listed more than once, in 8 rows: averaged; their scatter, 0.13 % of "
+                        "k by 4 degrees of freedom, is the error of every k"));
+  const std::string text = results::read_text(out);
+  EXPECT_THAT(text, HasSubstr("phi_deg: 90.0, k: 1.2e-06, u: "));
+  EXPECT_THAT(text, Not(HasSubstr("u: unknown")));
+}
+
+TEST_F(FitProgram, FitsStepsWithoutTheirZeroAndSaysSo) {
+  const std::string folder = steps("5x3");
+  std::string text = results::read_text(folder + "/steps.csv");
+  std::istringstream lines(text);
+  std::string header, without;
+  std::getline(lines, header);
+  const auto place =
+      std::count(header.begin(), header.begin() + static_cast<std::ptrdiff_t>(header.find("zero_n")), ',');
+  lines.seekg(0);
+  for (std::string line; std::getline(lines, line);) {
+    std::size_t begin = 0;
+    for (long i = 0; i < place; ++i) begin = line.find(',', begin) + 1;
+    without += line.erase(begin, line.find(',', begin) + 1 - begin) + "\n";
+  }
+  const std::string out = (folder_ / "k.yaml").string();
+  const Answer fit = kphi({"fit", file("steps.csv", without), "--no-report", "--accept", "--out", out, "--json"});
+  const Answer whole = kphi({"fit", folder, "--no-report", "--accept", "--json"});
+  EXPECT_EQ(fit.code, 0) << fit.err;
+  EXPECT_THAT(fit.err, HasSubstr("the zero that was subtracted from the thrust is unknown (no zero_n)"));
+  EXPECT_EQ(json::parse(fit.out)["K_T"], json::parse(whole.out)["K_T"]);
+  EXPECT_THAT(whole.err, Not(HasSubstr("zero that was subtracted")));
+}
+
 TEST_F(FitProgram, FitsATableThatCannotFlyAsFarAsItGoes) {
-  const Answer twice =
-      kphi({"fit", file("twice.csv", "phi_deg,k_n_s2_per_rad2\n0,1.5e-6\n90,1.2e-6\n90,1.1e-6\n180,8e-7\n")});
-  EXPECT_EQ(twice.code, 5);
-  EXPECT_THAT(twice.out, AllOf(HasSubstr("do not fly yet"), HasSubstr("phi_deg 90 is listed twice"),
-                               HasSubstr("by the scatter of 4 points about the line; no u of k was given")));
   const Answer without = kphi({"fit", file("without.csv", "phi_deg,k_n_s2_per_rad2\n90,1.2e-6\n180,8e-7\n")});
   EXPECT_EQ(without.code, 5);
   EXPECT_THAT(without.out, AllOf(HasSubstr("it has no k at phi_deg 0"), Not(HasSubstr("slope      -4.44444e-09 ±"))));

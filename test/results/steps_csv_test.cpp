@@ -113,6 +113,14 @@ TEST(StepsCsv, IsReadByTheNamesOfItsColumns) {
   EXPECT_THAT(complaint(replaced("thrust_n,", "thrust,")), HasSubstr("steps.csv:1: unknown column \"thrust\""));
   EXPECT_THAT(complaint(replaced("torque_nm,", "thrust_n,")), HasSubstr("steps.csv:1: column thrust_n occurs twice"));
   EXPECT_THAT(complaint(replaced("torque_nm,", "lag_u_s,")), HasSubstr("occurs twice"));
+  std::string without_zero = format_steps(std::vector<StepMean>{{.propeller = "5x3", .thrust_n = 2, .zero_n = 0.25}});
+  const auto erase = [&](const char* part) {
+    without_zero.erase(without_zero.find(part), std::string_view(part).size());
+  };
+  erase("zero_n,");
+  erase("0.25,");
+  EXPECT_TRUE(std::isnan(parse_steps(without_zero, "steps.csv").at(0).zero_n)) << "unknown, not zero";
+  EXPECT_EQ(parse_steps(without_zero, "steps.csv").at(0).thrust_n, 2);
   EXPECT_THAT(complaint("propeller\n"), HasSubstr("steps.csv:1: column blades is missing"));
 }
 

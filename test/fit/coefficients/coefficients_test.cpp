@@ -166,7 +166,8 @@ TEST_F(RecordedFitTest, FitsAndBudgetsTheSameAgain) {
   options.weighting = Weighting::effective_variance;
   options.estimator = Estimator::with_offset;
   options.curve.anchored = true;
-  options.curve.points_deg = {45, 180};
+  options.curve.points_deg = {45, 180, 270};
+  options.curve.loss = Loss::cauchy;
   options.speed_range.max_rad_s = from_rpm(17000).value();
   options.left_out = {{90, 2, "plate \"slipped\": seen"}};
   auto steps = study_campaign({}, 4).steps;

@@ -7,6 +7,7 @@
 
 #include "base/error.hpp"
 #include "fit/logs/import_table.hpp"
+#include "fit/model/table_line.hpp"
 
 namespace kphi::fit {
 namespace coefficient_table_test {
@@ -63,6 +64,50 @@ TEST(KTable, NamesTheLineThatIsWrong) {
               testing::ThrowsMessage<ConfigurationError>(testing::StrEq("K.csv:3: 1 fields where the header has 2")));
   EXPECT_TRUE(is_k_table("phi_deg,k\n"));
   EXPECT_FALSE(is_k_table("propeller,blades\n"));
+}
+
+TEST(RepeatedAngles, AreAveragedWithTheirPooledScatterAsTheError) {
+  const std::vector<CurvePoint> table{{90, 1.02, 0}, {0, 2, 0}, {90, 0.98, 0}, {180, 0.5, 0}};
+  const RepeatedAngles found = average_repeated(table);
+  ASSERT_EQ(found.points.size(), 3u);
+  EXPECT_EQ(found.angles, 1u);
+  EXPECT_EQ(found.rows, 2u);
+  EXPECT_FALSE(found.weighted);
+  EXPECT_NEAR(found.points[1].k, 1, 1e-15);
+  EXPECT_NEAR(found.scatter, 0.02 * std::sqrt(2), 1e-12);
+  // Student's factor of one degree of freedom, 12.706, over 1.960.
+  EXPECT_NEAR(found.points[0].standard_error, 2 * 0.02 * std::sqrt(2) * 12.7062 / 1.95996, 1e-5);
+  EXPECT_NEAR(found.points[1].standard_error, 0.02 * 12.7062 / 1.95996, 1e-5);
+  EXPECT_THAT(found.words(), HasSubstr("1 of 3 angles are listed more than once, in 2 rows"));
+  const RepeatedAngles plain = average_repeated(std::vector<CurvePoint>{{0, 2, 0.1}, {90, 1, 0.1}});
+  EXPECT_EQ(plain.angles, 0u);
+  EXPECT_EQ(plain.points[1].standard_error, 0.1);
+}
+
+TEST(RepeatedAngles, AreWeightedByTheirErrorsWhichScatterMayEnlarge) {
+  const RepeatedAngles as_told = average_repeated(std::vector<CurvePoint>{{0, 2, 0.1}, {90, 1, 0.1}, {90, 1.01, 0.2}});
+  EXPECT_TRUE(as_told.weighted);
+  EXPECT_NEAR(as_told.points[1].k, (1 * 4 + 1.01) / 5, 1e-12);
+  EXPECT_NEAR(as_told.points[1].standard_error, 1 / std::sqrt(100 + 25), 1e-12);
+  const RepeatedAngles more = average_repeated(std::vector<CurvePoint>{{0, 2, 0.1}, {90, 1, 0.1}, {90, 2, 0.1}});
+  EXPECT_NEAR(more.scatter, 5 * std::sqrt(2), 1e-12);
+  EXPECT_NEAR(more.points[1].standard_error, 5 * std::sqrt(2) * 0.1 / std::sqrt(2), 1e-12);
+  EXPECT_NEAR(more.points[0].standard_error, 5 * std::sqrt(2) * 0.1, 1e-12) << "its u come from the same hand";
+}
+
+TEST(RepeatedAngles, HoldTheTruthInNineteenOfTwentyTables) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  int within = 0;
+  constexpr int kTables = 2000;
+  for (int i = 0; i < kTables; ++i) {
+    std::vector<CurvePoint> table;
+    for (const double phi : {0.0, 45.0, 90.0})
+      for (int row = 0; row < 2; ++row) table.push_back({phi, (2 - phi / 100) * (1 + 0.01 * normal(random)), 0});
+    const CurvePoint K_T = average_repeated(table).points.front();
+    within += std::abs(K_T.k - 2) <= 1.96 * K_T.standard_error ? 1 : 0;
+  }
+  EXPECT_NEAR(within / static_cast<double>(kTables), 0.95, 0.015) << "three deviations";
 }
 
 TEST(Tables, NoMutationOfATableCrashesAReader) {

@@ -2,12 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <random>
+#include <sstream>
 #include <vector>
 
 #include "base/error.hpp"
+#include "fit/numerics/linear_regression.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::fit {
 namespace curve_fit_test {
@@ -111,6 +116,220 @@ TEST(LineFit, IsTheClosedFormOfAWeightedLine) {
     EXPECT_NEAR(fit.value("intercept") / ((sxx * sy - sx * sxy) / determinant), 1, 1e-11);
     EXPECT_NEAR(fit.value("slope_per_deg") / ((s * sxy - sx * sy) / determinant), 1, 1e-11);
   }
+}
+
+/// "data y x" of a file of NIST. Of points at one x their mean, which weighs as many.
+std::vector<CurvePoint> nist_points(const std::string& name, double error) {
+  std::ifstream file(kphi::test::source_dir() + ("/test/fit/nist/" + name));
+  std::vector<CurvePoint> points;
+  std::vector<double> counts;
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string word;
+    double y = 0, x = 0;
+    if (!(words >> word >> y >> x) || word != "data") continue;
+    const auto same = std::ranges::find(points, x, &CurvePoint::phi_deg);
+    if (same == points.end()) {
+      points.push_back({x, y, error});
+      counts.push_back(1);
+      continue;
+    }
+    double& count = counts[static_cast<std::size_t>(same - points.begin())];
+    same->k = (same->k * count + y) / (count + 1);
+    same->standard_error = error / std::sqrt(++count);
+  }
+  return points;
+}
+
+/// Of a parameter, by its weights over points with these errors.
+double error_of(const CurveParameter& parameter, std::vector<CurvePoint> points) {
+  std::ranges::sort(points, {}, &CurvePoint::phi_deg);
+  double variance = 0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    variance += std::pow(parameter.weights[i] * points[i].standard_error, 2);
+  return std::sqrt(variance);
+}
+
+TEST(LineFit, AgreesWithNistsNorrisToTenDigits) {
+  auto points = nist_points("Norris.txt", 1e-6);
+  ASSERT_EQ(points.size(), 35u) << "36, two of them at one x";
+  // Errors of k above the floor, and a residual deviation of 0.884796396144373 in NIST's errors.
+  for (CurvePoint& point : points) point.standard_error *= 1e7;
+  points.push_back({0, 700, 10});
+  const CurveFit fit = fit_curve(points);
+  EXPECT_NEAR(fit.value("intercept") / -0.262323073774029, 1, 1e-10);
+  EXPECT_NEAR(fit.value("slope_per_deg") / 1.00211681802045, 1, 1e-10);
+  const double share = 0.884796396144373 / 10;
+  EXPECT_NEAR(share * error_of(*fit.find("intercept"), points) / 0.232818234301152, 1, 1e-9);
+  EXPECT_NEAR(share * error_of(*fit.find("slope_per_deg"), points) / 0.429796848199937e-3, 1, 1e-9);
+}
+
+TEST(LineFit, AnchoredAgreesWithNistsNoIntToTenDigits) {
+  auto points = nist_points("NoInt1.txt", 10);
+  ASSERT_EQ(points.size(), 11u);
+  points.push_back({0, 0, 10});
+  const CurveFit fit = fit_curve(points, {.anchored = true});
+  EXPECT_NEAR(fit.value("slope_per_deg") / 2.07438016528926, 1, 1e-10);
+  points.back().standard_error = 0;  // NIST's origin has no error
+  EXPECT_NEAR(3.56753034006338 / 10 * error_of(*fit.find("slope_per_deg"), points) / 0.165289256198347e-1, 1, 1e-9);
+}
+
+/// Points of known errors about the paper's line.
+std::vector<CurvePoint> noisy_points(std::mt19937& random) {
+  std::normal_distribution<double> noise;
+  std::uniform_real_distribution<double> error(3e-9, 3e-8);
+  auto points = paper_points();
+  for (CurvePoint& point : points) {
+    point.standard_error = error(random);
+    point.k += point.standard_error * noise(random);
+  }
+  return points;
+}
+
+TEST(LineFit, WeighsTheKAsTheClosedFormDoes) {
+  std::mt19937 random(8);
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto points = noisy_points(random);
+    for (const bool anchored : {false, true}) {
+      const CurveFit fit = fit_curve(points, {.anchored = anchored});
+      // The derivatives by each k of the closed form.
+      std::vector<double> phi, weights;
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        phi.push_back(points[i].phi_deg);
+        weights.push_back(1 / (points[i].standard_error * points[i].standard_error));
+      }
+      double of_K_T = 0;
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        std::vector<double> unit(phi.size());
+        unit[i - 1] = 1;
+        const auto by = regress_polynomial(phi, unit, anchored ? 1 : 0, 1, weights).estimates;
+        of_K_T -= by.back();
+        EXPECT_NEAR(fit.find("slope_per_deg")->weights[i] / by.back(), 1, 1e-10);
+        if (!anchored) {
+          EXPECT_NEAR(fit.find("intercept")->weights[i] / by.front(), 1, 1e-10);
+        }
+      }
+      EXPECT_NEAR(fit.find("slope_per_deg")->weights[0], anchored ? of_K_T : 0, 1e-10 * std::abs(of_K_T));
+      EXPECT_EQ(fit.find("intercept")->weights[0], anchored ? 1 : 0);
+    }
+  }
+}
+
+/// A joint fit of every step, T = (intercept + slope φ + b_run) ω² with b_run of `between` from run to run and `noise`
+/// in each thrust: least squares on what whitens them. The line through the k of the occlusions is to be the same.
+TEST(LineFit, IsThatOfAllStepsFittedJointlyWhereTheirRunsScatter) {
+  constexpr double kBetween = 8e-9, kNoiseN = 0.01;
+  constexpr int kRepetitions = 3;
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  std::vector<double> x;  // of one run, ω²
+  for (double omega = 300; omega <= 2000; omega += 50) x.push_back(omega * omega);
+  double xx = 0;
+  for (const double one : x) xx += one * one;
+  std::vector<std::vector<double>> rows;
+  std::vector<double> whitened;
+  std::vector<CurvePoint> points = paper_points(0);
+  for (CurvePoint& point : points) {
+    // The first occlusion was measured twice only: its k weighs less.
+    const int runs = point.phi_deg == 45 ? kRepetitions - 1 : kRepetitions;
+    double k = 0;
+    for (int run = 0; run < runs; ++run) {
+      const double of_run = point.k + kBetween * normal(random);
+      std::vector<double> thrusts;
+      double xt = 0;
+      for (const double one : x) {
+        thrusts.push_back(of_run * one + kNoiseN * normal(random));
+        xt += one * thrusts.back();
+      }
+      k += xt / xx / runs;
+      if (point.phi_deg == 0) continue;
+      // Along x the variance is that of the noise and of b; everywhere else that of the noise.
+      const double along = 1 / std::sqrt(kNoiseN * kNoiseN + kBetween * kBetween * xx), beside = 1 / kNoiseN;
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        const auto white = [&](double own, double projected) { return beside * own + (along - beside) * projected; };
+        whitened.push_back(white(thrusts[i], x[i] * xt / xx));
+        rows.push_back({white(x[i], x[i]), white(x[i], x[i]) * point.phi_deg});
+      }
+    }
+    point.k = k;
+    point.standard_error = std::sqrt((kBetween * kBetween + kNoiseN * kNoiseN / xx) / runs);
+  }
+  const Regression jointly = regress(rows, whitened);
+  const CurveFit line = fit_curve(points);
+  EXPECT_NEAR(line.value("intercept") / jointly.estimates[0], 1, 1e-10);
+  EXPECT_NEAR(line.value("slope_per_deg") / jointly.estimates[1], 1, 1e-10);
+  EXPECT_NEAR(error_of(*line.find("slope_per_deg"), points) / std::sqrt(jointly.covariance[1][1]), 1, 1e-9);
+}
+
+class RobustLine : public ::testing::TestWithParam<Loss> {};
+
+TEST_P(RobustLine, OfGoodPointsIsNextToTheLineWithoutALoss) {
+  std::mt19937 random(3);
+  double squares = 0, plain_squares = 0, within = 0;
+  constexpr int kTrials = 1000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const auto points = noisy_points(random);
+    const CurveFit plain = fit_curve(points), robust = fit_curve(points, {.loss = GetParam()});
+    const CurveParameter at_135{.weights = robust.weights_at(135)};
+    within +=
+        std::abs(robust.k_at(135) - kThrustCoefficient * (1.03 - 0.65 / 225 * 135)) <= 1.96 * error_of(at_135, points);
+    squares += std::pow(robust.k_at(135) / paper_points()[0].k - (1.03 - 0.65 / 225 * 135), 2);
+    plain_squares += std::pow(plain.k_at(135) / paper_points()[0].k - (1.03 - 0.65 / 225 * 135), 2);
+  }
+  EXPECT_LT(squares / plain_squares, 1.15) << "95 % efficient with many points, here are four";
+  EXPECT_NEAR(within / kTrials, 0.95, 0.025) << "three deviations are 0.021";
+}
+
+TEST_P(RobustLine, IsALinearFunctionOfTheKWithTheWeightsOfTheLoss) {
+  std::mt19937 random(4);
+  for (int trial = 0; trial < 50; ++trial) {
+    auto points = noisy_points(random);
+    points[3].k += 4 * points[3].standard_error;
+    for (const bool anchored : {false, true}) {
+      const CurveFit fit = fit_curve(points, {.anchored = anchored, .loss = GetParam()});
+      std::vector<double> phi, k, weights;
+      for (std::size_t i = 0; i < fit.points.size(); ++i) {
+        phi.push_back(fit.points[i].phi_deg);
+        k.push_back(fit.points[i].k - (anchored ? fit.K_T : 0));
+        weights.push_back(fit.robust_weights[i] / (fit.sigmas[i] * fit.sigmas[i]));
+        EXPECT_GE(fit.robust_weights[i], 0);
+        EXPECT_LE(fit.robust_weights[i], 1);
+      }
+      const auto closed = regress_polynomial(phi, k, anchored ? 1 : 0, 1, weights).estimates;
+      EXPECT_NEAR(fit.value("slope_per_deg") / closed.back(), 1, 1e-6) << "the weights are those at the line itself";
+      for (const CurveParameter& parameter : fit.parameters) {
+        double value = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) value += parameter.weights[i] * points[i].k;
+        EXPECT_NEAR(value / parameter.value, 1, 1e-11) << parameter.key;
+      }
+    }
+  }
+}
+
+TEST_P(RobustLine, LetsAPointFarFromTheOthersPullLess) {
+  auto points = paper_points(1e-8);
+  points.insert(points.begin() + 3, {135, kThrustCoefficient * (1.03 - 0.65 / 225 * 135), 1e-8});
+  points[3].k -= 20 * points[3].standard_error;
+  const CurveFit plain = fit_curve(points), robust = fit_curve(points, {.loss = GetParam()});
+  const double truth = kThrustCoefficient * (1.03 - 0.65 / 225 * 90);
+  EXPECT_LT(std::abs(robust.k_at(90) - truth), 0.35 * std::abs(plain.k_at(90) - truth));
+  EXPECT_LT(robust.robust_weights[2], kRejectedWeight);
+  EXPECT_NE(robust.remarks({}, 270)[1].find("loss rejects k at 135°"), std::string::npos) << robust.remarks({}, 270)[1];
+  EXPECT_NE(robust.model().words(robust).find(name_of(GetParam())), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllLosses, RobustLine, ::testing::Values(Loss::huber, Loss::cauchy, Loss::tukey),
+                         [](const auto& loss) { return std::string(name_of(loss.param)); });
+
+TEST(LineFit, RefusesALossThatItCannotScaleOrWhereNothingIsLeft) {
+  auto points = paper_points(1e-8);
+  EXPECT_THROW((void)fit_curve(points, {.form = CurveForm::table, .loss = Loss::huber}), FitError);
+  points[2].standard_error = 0;
+  EXPECT_THROW((void)fit_curve(points, {.loss = Loss::huber}), FitError);
+  auto zigzag = paper_points(1e-8);
+  for (std::size_t i = 1; i < zigzag.size(); ++i) zigzag[i].k += (i % 2 == 0 ? 1 : -1) * 40 * zigzag[i].standard_error;
+  EXPECT_THROW((void)fit_curve(zigzag, {.loss = Loss::tukey}), FitError);
+  EXPECT_NO_THROW((void)fit_curve(zigzag, {.loss = Loss::huber}));
 }
 
 TEST(LineFit, FloorsTheErrorsSoThatOneRunCannotRuleTheLine) {

@@ -129,16 +129,22 @@ TEST(Compare, ReadsCampaignFolders) {
   EXPECT_THAT(comparison_table(same), HasSubstr("k(45°)"));
 }
 
-TEST(Compare, ReadsStepsWithoutOcclusion) {
-  const TemporaryFolder folder;
+TEST(Compare, TakesALogWithTheBudgetOfItsFit) {
   auto steps = campaign_steps();
   std::erase_if(steps, [](const results::StepMean& step) { return step.occlusion_deg > 0; });
-  results::write_steps(folder.path() / "steps.csv", steps);
-  const ComparedResult loaded = load_result(folder.path().string());
-  ASSERT_EQ(loaded.estimates.size(), 1u);
-  EXPECT_NEAR(loaded.estimates[0].value, CampaignTruth{}.K_T, 3e-9);
+  const Fitted fitted = analysed(identify(steps));
+  const ComparedResult log = result_of_log(fitted, Origin::measured, "log");
+  ASSERT_EQ(log.estimates.size(), 1u);
+  EXPECT_EQ(log.estimates[0].value, fitted.identification.table.front().k);
+  EXPECT_EQ(log.estimates[0].standard_error, fitted.analysis.coefficients.front().combined());
+  EXPECT_GT(log.estimates[0].standard_error, 0);
+  EXPECT_NEAR(to_rpm(RadPerSec(log.speed_max_rad_s)), 19100, 1);
+}
+
+TEST(Compare, RefusesStepsThatWereNotFitted) {
+  const TemporaryFolder folder;
   results::write_steps(folder.path() / "steps.csv", campaign_steps());
-  EXPECT_THROW((void)load_result(folder.path().string()), ConfigurationError) << "not fitted yet";
+  EXPECT_THROW((void)load_result(folder.path().string()), ConfigurationError);
 }
 
 TEST(Compare, RemarksWhatMakesResultsUnlike) {

@@ -174,11 +174,39 @@ TEST(SampleTimes, AreStrictlyIncreasingAndTheSamplesOwn) {
   EXPECT_LT(worst, 10e3) << "ns, beside the smallest delay of the wire";
 }
 
+TEST(SampleTimes, AreNeverLaterThanTheArrival) {
+  for (const int records : {1, 7, 40}) {
+    RunRecording run = make_run(stream_of(25, records, 200));
+    run.header.load_cell.device_rate_hz = 7000;
+    const std::vector<Nanoseconds> times = sample_times(run);
+    ASSERT_EQ(times.size(), run.load_cell.size());
+    std::size_t line_is_later = 0;
+    const Map map(run.load_cell, 7000);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      ASSERT_LE(times[i], run.load_cell[i].arrival_ns) << i;
+      ASSERT_TRUE(i == 0 || times[i] > times[i - 1]) << i;
+      ASSERT_NEAR(static_cast<double>(times[i]), static_cast<double>(map.time_ns(map.epochs()[0], i)), 50e3) << i;
+      line_is_later += map.time_ns(map.epochs()[0], i) > run.load_cell[i].arrival_ns ? 1 : 0;
+    }
+    EXPECT_GT(line_is_later, 0u) << "or the test shows nothing";
+  }
+}
+
+TEST(SampleTimes, OfAStampThatSteppedStayOnTheLine) {
+  RunRecording run = make_run(stream_of(0, 1, 30));
+  run.header.load_cell.device_rate_hz = 7000;
+  const std::vector<Nanoseconds> before = sample_times(run);
+  for (std::size_t i = 7000; i < 7010; ++i) run.load_cell[i].arrival_ns -= 3'000'000'000;
+  const std::vector<Nanoseconds> after = sample_times(run);
+  for (std::size_t i = 0; i < after.size(); ++i)
+    ASSERT_NEAR(static_cast<double>(after[i]), static_cast<double>(before[i]), 50e3) << i;
+}
+
 TEST(SampleTimes, WithoutARateAreTheArrivals) {
   RunRecording run = make_run(stream_of(0, 40, 20));
   run.header.load_cell.device_rate_hz = 0;
   const std::vector<Nanoseconds> times = sample_times(run);
-  EXPECT_EQ(times.front(), run.load_cell.front().arrival_ns);
+  EXPECT_EQ(times.at(39), run.load_cell.front().arrival_ns) << "of a datagram the last, the others just before it";
   for (std::size_t i = 1; i < times.size(); ++i) ASSERT_GT(times[i], times[i - 1]);
 }
 
