@@ -28,13 +28,11 @@ double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.
 std::vector<results::RunShare> shares_of(const AngleScatter& angle) {
   std::vector<results::RunShare> shares;
   for (const RunSums& run : angle.runs) {
-    const double zero = run.zero_u_n * angle.zero_sensitivity;
-    shares.push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k),
-                      angle.zero_sensitivity / angle.k});
-    if (angle.within.offset_variance > 0 && run.has_offset()) {
-      shares.back().offset_n = run.offset();
-      shares.back().offset_variance = angle.within.offset_variance + square(run.offset_zero_u_n);
-    }
+    const bool offset = angle.within.offset_variance > 0 && run.has_offset();
+    shares.push_back({run.k() / angle.k,
+                      (angle.within.variance + square(run.zero_u_n * angle.zero_sensitivity)) / square(angle.k),
+                      angle.zero_sensitivity / angle.k, offset ? run.offset() : 0,
+                      offset ? angle.within.offset_variance + square(run.offset_zero_u_n) : 0});
   }
   return shares;
 }
@@ -68,7 +66,7 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
   std::map<int, results::SharedZero> in_offset;
   for (std::size_t i = 0; i < steps.size(); ++i)
     if (const RunSums& run = runs.at(steps[i].repetition); run.has_offset())
-      in_offset[steps[i].repetition].add(steps[i], run.weight_in_offset(weight_of(fit, i), shape(fit, k, i)));
+      in_offset[steps[i].repetition].add(steps[i], run.in_offset(weight_of(fit, i), shape(fit, k, i)));
   std::vector<RunSums> result;
   for (auto& [repetition, run] : runs) {
     run.phi_deg = phi_deg;
@@ -99,7 +97,7 @@ WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const T
     const double residual = fit.points[i].thrust_n - (lines ? run.offset() + run.slope() * x : run.k() * x);
     LevelResiduals& level = levels[steps[i].step];
     level.wx += w * x;
-    if (lines) level.in_offset += run.weight_in_offset(w, x);
+    if (lines) level.in_offset += run.in_offset(w, x);
     level.sum += residual;
     level.squares += residual * residual;
     ++level.count;
@@ -198,7 +196,6 @@ double Repeatability::freedom() const {
     within_freedom += angles[i].within.freedom;
     ++n;
   }
-  if (n == 0) return std::numeric_limits<double>::infinity();
   double spread = 0;
   if (between.freedom > 0) spread += std::pow(share / n, 2) / between.freedom;
   if (zero_beyond.freedom > 0) spread += std::pow(zero_share / n, 2) / zero_beyond.freedom;

@@ -30,9 +30,7 @@ struct RunSums {
   [[nodiscard]] double offset() const { return (xx * t - x * xt) / determinant(); }  ///< of the line of T on x, N
   [[nodiscard]] double slope() const { return (w * xt - x * t) / determinant(); }    ///< of that
   /// Change of offset() for 1 N of a step.
-  [[nodiscard]] double weight_in_offset(double weight, double of_x) const {
-    return weight * (xx - x * of_x) / determinant();
-  }
+  [[nodiscard]] double in_offset(double w1, double x1) const { return w1 * (xx - x * x1) / determinant(); }
   [[nodiscard]] double determinant() const { return w * xx - x * x; }
 };
 

