@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/statistics.hpp"
 #include "results/reduction/repetitions.hpp"
 #include "results/reduction/run_scatter.hpp"
 #include "results/reduction/run_zero.hpp"
@@ -19,7 +20,7 @@ double shape(const ThrustFit& fit, double k, std::size_t i) {
 
 /// Residuals of one step index over the runs that have it.
 struct LevelResiduals {
-  double wx = 0, count = 0, sum = 0, squares = 0;
+  double wx = 0, count = 0, sum = 0, squares = 0, in_offset = 0;
 };
 
 double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
@@ -27,14 +28,21 @@ double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.
 std::vector<results::RunShare> shares_of(const AngleScatter& angle) {
   std::vector<results::RunShare> shares;
   for (const RunSums& run : angle.runs) {
-    const double zero = run.zero_u_n * angle.zero_sensitivity;
-    shares.push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
+    const bool offset = angle.within.offset_variance > 0 && run.has_offset();
+    shares.push_back({run.k() / angle.k,
+                      (angle.within.variance + square(run.zero_u_n * angle.zero_sensitivity)) / square(angle.k),
+                      angle.zero_sensitivity / angle.k, offset ? run.offset() : 0,
+                      offset ? angle.within.offset_variance + square(run.offset_zero_u_n) : 0});
   }
   return shares;
 }
 
 double between_u(const Repeatability& all, const AngleScatter& angle) {
   return all.between.u * std::abs(angle.k) / std::sqrt(std::max(1.0, count(angle)));
+}
+
+double zero_beyond_u(const Repeatability& all, const AngleScatter& angle) {
+  return all.zero_beyond.u * angle.zero_sensitivity / std::sqrt(std::max(1.0, count(angle)));
 }
 
 }  // namespace
@@ -51,13 +59,20 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
     run.xt += w * x * fit.points[i].thrust_n;
     run.xx += w * x * x;
     run.x += w * x;
+    run.w += w;
+    run.t += w * fit.points[i].thrust_n;
     zeros[steps[i].repetition].add(steps[i], w * x);
   }
+  std::map<int, results::SharedZero> in_offset;
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (const RunSums& run = runs.at(steps[i].repetition); run.has_offset())
+      in_offset[steps[i].repetition].add(steps[i], run.in_offset(weight_of(fit, i), shape(fit, k, i)));
   std::vector<RunSums> result;
   for (auto& [repetition, run] : runs) {
     run.phi_deg = phi_deg;
     run.repetition = repetition;
     run.zero_u_n = zeros.at(repetition).u_n(moved.at(repetition));
+    run.offset_zero_u_n = in_offset[repetition].u_n(moved.at(repetition));
     if (run.xx > 0) result.push_back(run);
   }
   return result;
@@ -65,20 +80,24 @@ std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepM
 
 WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
                                std::span<const RunSums> runs) {
-  std::map<int, double> k_of;
+  std::map<int, const RunSums*> run_of;
   double xx = 0;
   for (const RunSums& run : runs) {
-    k_of[run.repetition] = run.k();
+    run_of[run.repetition] = &run;
     xx += run.xx / static_cast<double>(runs.size());
   }
-  const bool repeated = runs.size() > 1;
   std::map<int, LevelResiduals> levels;
+  for (const results::StepMean& step : steps) levels[step.step];
+  const bool repeated = runs.size() > 1,
+             lines = repeated && levels.size() > 2 && std::ranges::all_of(runs, &RunSums::has_offset);
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (!k_of.contains(steps[i].repetition)) continue;
-    const double x = shape(fit, k, i);
-    const double residual = fit.points[i].thrust_n - k_of[steps[i].repetition] * x;
+    if (!run_of.contains(steps[i].repetition)) continue;
+    const RunSums& run = *run_of[steps[i].repetition];
+    const double x = shape(fit, k, i), w = weight_of(fit, i);
+    const double residual = fit.points[i].thrust_n - (lines ? run.offset() + run.slope() * x : run.k() * x);
     LevelResiduals& level = levels[steps[i].step];
-    level.wx += weight_of(fit, i) * x;
+    level.wx += w * x;
+    if (lines) level.in_offset += run.in_offset(w, x);
     level.sum += residual;
     level.squares += residual * residual;
     ++level.count;
@@ -94,11 +113,13 @@ WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const T
     sum += part;
     square_sum += std::pow(std::pow(level.wx / level.count, 2), 2) / freedom;
     counted += std::pow(level.wx / level.count, 2);
+    result.offset_variance += std::pow(level.in_offset / level.count, 2) * variance;
   }
-  const double n = static_cast<double>(levels.size());
-  if (!(counted > 0) || n < 2) return result;
-  result.variance = sum / (xx * xx) * n / (n - 1);  // one k per run was fitted
-  result.freedom = counted * counted / square_sum * (n - 1) / n;
+  const double n = static_cast<double>(levels.size()), fitted = lines ? 2 : 1;  // for each run
+  if (!(counted > 0) || n < 2) return {};
+  result.variance = sum / (xx * xx) * n / (n - fitted);
+  result.freedom = counted * counted / square_sum * (n - fitted) / n;
+  result.offset_variance *= n / (n - fitted);
   return result;
 }
 
@@ -132,8 +153,9 @@ Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& ze
   result.angles = std::move(angles);
   result.repeated = result.between_known = results::freedom_between(shares) > 0;
   if (!result.repeated) return result;
-  const double variance = results::variance_between(shares);
-  result.between = {0, std::sqrt(variance), results::freedom_of(variance, shares)};
+  const results::RunScatter scatter = results::scatter_between(shares);
+  result.between = {0, scatter.share, scatter.share_freedom};
+  result.zero_beyond = {0, scatter.zero_n, scatter.zero_freedom};
   return result;
 }
 
@@ -149,22 +171,34 @@ std::vector<OutlyingRun> outlying_runs(std::span<const results::StepMean> used) 
 double Repeatability::independent_u(std::size_t i) const {
   const AngleScatter& angle = angles[i];
   return std::sqrt(std::pow(angle.within_u(), 2) + std::pow(angle.zero_u(), 2) + std::pow(between_u(*this, angle), 2) +
-                   std::pow(mounting.value_or(0) * angle.k, 2));
+                   std::pow(zero_beyond_u(*this, angle), 2) + std::pow(mounting.value_or(0) * angle.k, 2));
+}
+
+double Repeatability::freedom_of_zero() const {
+  double told = 0, beyond = 0;
+  for (const AngleScatter& angle : angles) {
+    told += square(angle.zero_u_n);
+    beyond += square(zero_beyond.u) / std::max(1.0, count(angle));
+  }
+  double spread = zero_movement.value > 0 ? square(told) / zero_movement.freedom : 0;
+  if (beyond > 0) spread += square(beyond) / zero_beyond.freedom;
+  return spread > 0 ? square(told + beyond) / spread : 0;
 }
 
 double Repeatability::freedom() const {
-  double share = 0, within_share = 0, within_freedom = 0, n = 0;
+  double share = 0, zero_share = 0, within_share = 0, within_freedom = 0, n = 0;
   for (std::size_t i = 0; i < angles.size(); ++i) {
     const double whole = std::pow(independent_u(i), 2);
     if (!(whole > 0)) continue;
     share += std::pow(between_u(*this, angles[i]), 2) / whole;
+    zero_share += std::pow(zero_beyond_u(*this, angles[i]), 2) / whole;
     within_share += std::pow(angles[i].within_u(), 2) / whole;
     within_freedom += angles[i].within.freedom;
     ++n;
   }
-  if (n == 0) return std::numeric_limits<double>::infinity();
   double spread = 0;
   if (between.freedom > 0) spread += std::pow(share / n, 2) / between.freedom;
+  if (zero_beyond.freedom > 0) spread += std::pow(zero_share / n, 2) / zero_beyond.freedom;
   if (within_freedom > 0) spread += std::pow(within_share / n, 2) / within_freedom;
   return spread > 0 ? 1 / spread : std::numeric_limits<double>::infinity();
 }

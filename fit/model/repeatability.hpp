@@ -22,18 +22,28 @@ inline constexpr const char* kRemount = "mount each repetition anew (remount_eac
 struct RunSums {
   double phi_deg = 0;
   int repetition = 0;
-  double xt = 0;        ///< Σ w x T; x = ω², or the map's term in its place
-  double xx = 0;        ///< Σ w x²
-  double x = 0;         ///< Σ w x
-  double zero_u_n = 0;  ///< standard, of the zero that its steps share; 0: unknown
+  double xt = 0;               ///< Σ w x T; x = ω², or the map's term in its place
+  double xx = 0;               ///< Σ w x²
+  double x = 0;                ///< Σ w x
+  double zero_u_n = 0;         ///< standard, of the zero that its steps share; 0: unknown
+  double w = 0;                ///< Σ w
+  double t = 0;                ///< Σ w T
+  double offset_zero_u_n = 0;  ///< as zero_u_n, of offset()
 
   [[nodiscard]] double k() const { return xt / xx; }  ///< N/(rad/s)²
+  [[nodiscard]] bool has_offset() const { return determinant() > 1e-6 * w * xx; }
+  [[nodiscard]] double offset() const { return (xx * t - x * xt) / determinant(); }  ///< of the line of T on x, N
+  [[nodiscard]] double slope() const { return (w * xt - x * t) / determinant(); }    ///< of that
+  /// Change of offset() for 1 N of a step.
+  [[nodiscard]] double in_offset(double w1, double x1) const { return w1 * (xx - x * x1) / determinant(); }
+  [[nodiscard]] double determinant() const { return w * xx - x * x; }
 };
 
 /// Scatter of the steps of one φ within their runs.
 struct WithinRuns {
   double variance = 0;  ///< of the k of one run, (N/(rad/s)²)²
   double freedom = 0;
+  double offset_variance = 0;  ///< of the offset of one run, N²; 0: not known
 };
 
 /// One per repetition, ascending. `fit` was made of `steps`, one point each in the same order; x is its map divided by
@@ -41,9 +51,9 @@ struct WithinRuns {
 [[nodiscard]] std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps,
                                                 const ThrustFit& fit, double k, const results::ZeroMovement& movement);
 
-/// From the interaction of step and repetition, which contains neither errors of whole runs nor of the map; from the
-/// residuals of a single run. Each step counts by its own scatter (MacKinnon, White 1985), since thrust scatters more
-/// where it is high.
+/// From the interaction of step and repetition, which contains neither errors of whole runs, in proportion or in
+/// newtons, nor of the map; from the residuals of a single run. Each step counts by its own scatter (MacKinnon, White
+/// 1985), since thrust scatters more where it is high.
 [[nodiscard]] WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
                                              std::span<const RunSums> runs);
 
@@ -61,8 +71,9 @@ struct AngleScatter {
 
 struct Repeatability {
   std::vector<AngleScatter> angles;
-  Estimate between;       ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  bool repeated = false;  ///< at least one φ was measured more than once
+  Estimate between;        ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
+  Estimate zero_beyond{};  ///< and of an error that adds to the thrust, beyond what is told of the zero, N
+  bool repeated = false;   ///< at least one φ was measured more than once
   bool between_known = false;        ///< from repetitions, given or assumed
   bool mounted_once = false;         ///< for all repetitions of a φ: `between` does not hold the mounting
   std::optional<double> mounting{};  ///< then: standard deviation of k from mounting to mounting, as a share
@@ -71,6 +82,8 @@ struct Repeatability {
 
   /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
   [[nodiscard]] double independent_u(std::size_t i) const;
+  /// Degrees of freedom of the zero, which all φ share; 0: endless.
+  [[nodiscard]] double freedom_of_zero() const;
   /// Degrees of freedom of those uncertainties, which share `between`.
   [[nodiscard]] double freedom() const;
 };

@@ -71,9 +71,12 @@ void take_scatter(const profiles::Campaign& campaign, const StandNoise& noise, R
   for (const AngleScatter& angle : all.angles) {
     const double zero = angle.runs.front().zero_u_n * angle.zero_sensitivity;
     shares.emplace_back(angle.runs.size(),
-                        results::RunShare{1, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
+                        results::RunShare{1, (angle.within.variance + zero * zero) / (angle.k * angle.k),
+                                          angle.zero_sensitivity / angle.k});
   }
-  all.between = {0, u, all.repeated ? std::max(1.0, results::freedom_of(u * u, shares)) : noise.runs_freedom};
+  const results::RunScatter scatter = results::scatter_expected(u, noise.runs_n, shares);
+  all.between = {0, u, all.repeated ? std::max(1.0, scatter.share_freedom) : noise.runs_freedom};
+  all.zero_beyond = {0, noise.runs_n, all.repeated ? std::max(1.0, scatter.zero_freedom) : noise.runs_freedom};
   all.mounted_once = !remounts;
   if (remounts) return;
   all.mounting = noise.mounting.value_or(kAssumedMounting);

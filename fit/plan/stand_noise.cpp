@@ -26,7 +26,7 @@ struct Entry {
   std::variant<double StandNoise::*, std::optional<double> StandNoise::*> member;
 };
 
-const std::array<Entry, 17> kEntries{{{"noise-n", &StandNoise::noise_n},
+const std::array<Entry, 18> kEntries{{{"noise-n", &StandNoise::noise_n},
                                       {"noise-share", &StandNoise::noise_share},
                                       {"slow-n", &StandNoise::slow_n},
                                       {"slow-share", &StandNoise::slow_share},
@@ -36,6 +36,7 @@ const std::array<Entry, 17> kEntries{{{"noise-n", &StandNoise::noise_n},
                                       {"zero-n", &StandNoise::zero_n},
                                       {"zero-walk-n", &StandNoise::zero_walk_n},
                                       {"runs", &StandNoise::runs},
+                                      {"runs-n", &StandNoise::runs_n},
                                       {"mounting", &StandNoise::mounting},
                                       {"campaigns", &StandNoise::campaigns},
                                       {"model", &StandNoise::model},
@@ -212,7 +213,8 @@ void add_shares(const PilotCampaign& pilot, const StandNoise& noise,
       const auto& [begin, end] = spans.at(run.repetition);
       const double zero =
           zeros.at(run.repetition).u_n(noise.zero_walk_n * std::sqrt((end - begin) / 60)) * angle.zero_sensitivity;
-      shares.back().push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k)});
+      shares.back().push_back({run.k() / angle.k, (angle.within.variance + zero * zero) / (angle.k * angle.k),
+                               angle.zero_sensitivity / angle.k});
     }
   }
 }
@@ -252,14 +254,15 @@ double mean_of_stands(std::span<const StandNoise> all, double StandNoise::*membe
 void take_runs(std::span<const PilotCampaign> pilots, StandNoise& noise) {
   std::vector<std::vector<results::RunShare>> shares;
   for (const PilotCampaign& pilot : pilots) add_shares(pilot, noise, shares);
-  const double variance = results::variance_between(shares);
-  noise.runs_freedom = results::freedom_of(variance, shares);
+  const results::RunScatter scatter = results::scatter_between(shares);
+  noise.runs_freedom = scatter.share_freedom;
+  noise.runs_n = scatter.zero_n;
   if (pilots.front().mounted_once) {
-    noise.runs = std::sqrt(variance);
+    noise.runs = scatter.share;
     const Repeatability& first = pilots.front().fitted.identification.repeatability;
     if (!first.mounting_assumed) noise.mounting = first.mounting;
   } else {
-    noise.mounting = std::sqrt(variance);  // with what a run adds: the two cannot be told apart
+    noise.mounting = scatter.share;  // with what a run adds: the two cannot be told apart
   }
 }
 

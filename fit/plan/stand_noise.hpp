@@ -28,6 +28,7 @@ struct StandNoise {
   double zero_n = 0;       ///< of the mean of a run's two zeros, 1 s each, by their samples, standard, N
   double zero_walk_n = 0;  ///< how far the zero moves in a minute, standard deviation, N
   double runs = 0;         ///< from run to run beyond noise and zero, standard deviation, share of k
+  double runs_n = 0;       ///< from run to run beyond noise and zero, added to the thrust, standard deviation, N
   double runs_freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind `runs`
   std::optional<double> mounting{};  ///< from mounting to mounting, share of k; nullopt: not measured
   double campaigns = 0;              ///< from campaign to campaign, common to all k, share
@@ -57,8 +58,8 @@ struct PilotCampaign {
 [[nodiscard]] StandNoise noise_of(std::span<const PilotCampaign> pilots);
 
 /// "NAME=VALUE" replaces one number, in the units of the members: noise-n, noise-share, memory-s, slow-n,
-/// slow-share, slow-memory-s, settle-s, zero-n, zero-walk-n, runs, mounting, campaigns, model, bend, k-t, intercept,
-/// slope-per-deg. Throws ConfigurationError.
+/// slow-share, slow-memory-s, settle-s, zero-n, zero-walk-n, runs, runs-n, mounting, campaigns, model, bend, k-t,
+/// intercept, slope-per-deg. Throws ConfigurationError.
 void state(StandNoise& noise, const std::string& text);
 
 /// NAME and VALUE of all that is known, as state() reads them.

@@ -182,24 +182,27 @@ Chart chart_of(const std::vector<HistoryEntry>& entries, Followed quantity) {
 }
 
 /// From run to run, as all campaigns of the stand show it: one alone knows its own scatter by a third at best.
-Estimate pooled_between(std::span<const Fitted> campaigns) {
-  double squares = 0, freedom = 0;
+Estimate pooled(std::span<const Fitted> campaigns, Estimate Repeatability::*part) {
+  double squares = 0, freedom = 0, n = 0;
   for (const Fitted& one : campaigns) {
-    const Estimate& between = one.identification.repeatability.between;
-    if (!one.identification.repeatability.between_known || !std::isfinite(between.freedom)) continue;
-    squares += between.freedom * between.u * between.u;
-    freedom += between.freedom;
+    const Estimate& own = one.identification.repeatability.*part;
+    if (!one.identification.repeatability.between_known || !std::isfinite(own.freedom)) continue;
+    squares += own.u * own.u;
+    freedom += own.freedom;
+    ++n;
   }
-  return {0, freedom > 0 ? std::sqrt(squares / freedom) : 0, freedom};
+  return {0, n > 0 ? std::sqrt(squares / n) : 0, freedom};
 }
 
 /// The errors that are new in each campaign.
 class OwnErrors {
  public:
-  OwnErrors(const Fitted& one, const Estimate& between, double scale) : one_(one), scale_(scale) {
+  OwnErrors(const Fitted& one, const Estimate& between, const Estimate& zero_beyond, double scale)
+      : one_(one), scale_(scale) {
     Repeatability repeatability = one.identification.repeatability;
     if (between.freedom > 0) {
       repeatability.between = between;
+      repeatability.zero_beyond = zero_beyond;
       repeatability.between_known = true;
     }
     sources_ = error_sources(repeatability, one.analysis.speed, {});
@@ -326,11 +329,13 @@ History history_of(std::span<const Fitted> campaigns, std::span<const std::strin
   history.propeller = campaigns.front().identification.propeller;
   history.air = common_air(campaigns);
   history.occlusions_deg = measured_by_all(campaigns);
-  const Estimate between = pooled_between(campaigns);
+  const Estimate between = pooled(campaigns, &Repeatability::between),
+                 zero_beyond = pooled(campaigns, &Repeatability::zero_beyond);
   std::vector<std::vector<Estimate>> tables;
   for (std::size_t i = 0; i < campaigns.size(); ++i) {
     const Identification& one = campaigns[i].identification;
-    const OwnErrors own(campaigns[i], between, history.air == Air::standard ? kStandardDensity / one.air->value : 1);
+    const OwnErrors own(campaigns[i], between, zero_beyond,
+                        history.air == Air::standard ? kStandardDensity / one.air->value : 1);
     tables.emplace_back();
     for (std::size_t j = 0; j < one.table.size(); ++j)
       if (std::ranges::count(history.occlusions_deg, one.table[j].phi_deg) > 0) tables.back().push_back(own.k(j));

@@ -110,8 +110,10 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
   ErrorSource noise{"noise within runs", Evaluation::type_a, kUnitOfK};
   ErrorSource between{"repetitions", all.repeated ? Evaluation::type_a : Evaluation::type_b, "1"};
   ErrorSource zero{"zero", Evaluation::type_b, "N",
-                   "of each run: as measured, and how far zeros usually move in a run"};
-  zero.shared_freedom = all.zero_movement.value > 0 ? all.zero_movement.freedom : 0;
+                   all.zero_beyond.u > 0
+                       ? "of each run: as measured and as zeros usually move, and what repetitions add"
+                       : "of each run: as measured, and how far zeros usually move in a run"};
+  zero.shared_freedom = all.freedom_of_zero();
   between.shared_freedom = all.between.freedom;
   between.assumed = !all.repeated && all.mounting_assumed;
   between.note = all.repeated      ? "beyond noise and zero, pooled over phi"
@@ -124,7 +126,7 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
     const double runs = static_cast<double>(angle.runs.size());
     noise.effects.push_back({angle.within_u(), 1, angle.within.freedom > 0 ? angle.within.freedom : kEndless});
     between.effects.push_back({all.between_known ? all.between.u / std::sqrt(runs) : kUnknown, angle.k});
-    zero.effects.push_back({angle.zero_u_n, angle.zero_sensitivity});
+    zero.effects.push_back({std::hypot(angle.zero_u_n, all.zero_beyond.u / std::sqrt(runs)), angle.zero_sensitivity});
   }
   sources.sources.insert(sources.sources.end(), {noise, between, zero});
   if (all.mounted_once) sources.sources.push_back(mounting_of(all));

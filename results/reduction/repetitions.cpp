@@ -47,6 +47,7 @@ void fit_k(const Group& run, const std::set<int>& levels, const ZeroMovement& mo
     zero.add(*step, x);
   }
   figure.k = tx / xx;
+  figure.per_n = x_sum / xx;
   figure.u = std::sqrt(variance + square(zero.u_n(movement.of_run_n(*run.front())) * x_sum)) / xx;
 }
 
@@ -92,11 +93,15 @@ void judge_among_all(RepetitionFigure& figure, std::vector<std::vector<RunShare>
                      double all, const RepetitionRule& rule) {
   const RunShare run = others[o][r];
   others[o].erase(others[o].begin() + static_cast<std::ptrdiff_t>(r));
-  const double beyond = variance_between(others), n = static_cast<double>(others[o].size());
-  double mean = 0, variance = run.variance + beyond;
+  const RunScatter beyond = scatter_between(others, Doubt::none);
+  const auto whole = [&](const RunShare& one) {
+    return one.variance + square(beyond.share) + square(beyond.zero_n * one.per_n);
+  };
+  const double n = static_cast<double>(others[o].size());
+  double mean = 0, variance = whole(run);
   for (const RunShare& other : others[o]) {
     mean += other.k / n;
-    variance += (other.variance + beyond) / (n * n);
+    variance += whole(other) / (n * n);
   }
   const boost::math::students_t student(freedom_between(others));
   const double chance = 2 * boost::math::cdf(complement(student, std::abs(run.k - mean) / std::sqrt(variance)));
@@ -114,7 +119,8 @@ void judge(std::vector<RepetitionVerdict>& verdicts, const RepetitionRule& rule)
     if (!k.empty()) verdict.k = median(k);
     shares.emplace_back();
     for (const RepetitionFigure& figure : verdict.repetitions) {
-      if (!std::isnan(figure.k)) shares.back().push_back({figure.k / verdict.k, square(figure.u / verdict.k)});
+      if (!std::isnan(figure.k))
+        shares.back().push_back({figure.k / verdict.k, square(figure.u / verdict.k), figure.per_n / verdict.k});
     }
     if (k.size() > 1) all += static_cast<double>(k.size());
   }

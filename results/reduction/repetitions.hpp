@@ -14,6 +14,7 @@ struct RepetitionFigure {
   int repetition = 0;
   double k = kNotMeasured;
   double u = kNotMeasured;  ///< standard, from within the steps, the zeros and their drift
+  double per_n = 0;         ///< change of k for 1 N of zero
   bool usable = false;      ///< at least half of its steps are good
   bool outlying = false;
   double away = kNotMeasured;  ///< k over the median of all (Student: mean of others), less 1
@@ -44,7 +45,7 @@ struct RepetitionRule {
   double threshold = 3;
   double least_share = 0.001;
   /// From then on: Student's test of the run against the mean of the others of its occlusion, with the scatter of all
-  /// other runs (variance_between), at this level for one of all runs (Bonferroni). threshold · least_share of k is
+  /// other runs (scatter_between), at this level for one of all runs (Bonferroni). threshold · least_share of k is
   /// never outlying.
   double level = 0.05;
   /// A spread of more than this share of k is too much, even if no repetition stands out.

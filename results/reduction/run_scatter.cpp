@@ -9,23 +9,105 @@ namespace kphi::results {
 
 namespace {
 
-/// χ² of the runs about the mean of their occlusion if the variance between runs were larger by `beyond`.
-double chi_squared(std::span<const std::vector<RunShare>> occlusions, double beyond) {
-  double sum = 0;
+/// Sum of the squares of `freedom` deviations, whose variance is known + of_share · share + of_zero · zero.
+struct Sample {
+  double freedom = 0, squares = 0, known = 0, of_share = 0, of_zero = 0;
+};
+
+Sample sample_of(const std::vector<RunShare>& runs, double RunShare::*value, double RunShare::*known) {
+  const double n = static_cast<double>(runs.size());
+  Sample sample{.freedom = n - 1};
+  double middle = 0;
+  for (const RunShare& run : runs) {
+    middle += run.*value / n;
+    sample.known += run.*known / n;
+  }
+  for (const RunShare& run : runs) sample.squares += square(run.*value - middle);
+  return sample;
+}
+
+std::vector<Sample> samples_of(std::span<const std::vector<RunShare>> occlusions) {
+  std::vector<Sample> samples;
   for (const auto& runs : occlusions) {
-    const double n = static_cast<double>(runs.size());
-    if (n < 2) continue;
-    double mean = 0, variances = 0;
-    for (const RunShare& run : runs) {
-      mean += run.k / n;
-      variances += run.variance + beyond;
-    }
-    for (const RunShare& run : runs) {
-      const double variance = (run.variance + beyond) * (1 - 2 / n) + variances / (n * n);
-      sum += square(run.k - mean) / variance * (n - 1) / n;
+    if (runs.size() < 2) continue;
+    Sample k = sample_of(runs, &RunShare::k, &RunShare::variance);
+    k.of_share = 1;
+    for (const RunShare& run : runs) k.of_zero += square(run.per_n) / static_cast<double>(runs.size());
+    samples.push_back(k);
+    if (std::ranges::any_of(runs, [](const RunShare& run) { return !(run.offset_variance > 0); })) continue;
+    Sample offset = sample_of(runs, &RunShare::offset_n, &RunShare::offset_variance);
+    // What is not explained adds to both as what is explained does.
+    offset.of_zero = k.known > 0 ? offset.known * k.of_zero / k.known : 1;
+    samples.push_back(offset);
+  }
+  for (Sample& one : samples) one.known = std::max({one.known, 1e-6 * one.squares, 1e-30});
+  return samples;
+}
+
+/// The two variances, and Fisher's information of them.
+struct Fit {
+  double share = 0, zero = 0;
+  double of_share = 0, of_both = 0, of_zero = 0;
+
+  [[nodiscard]] double variance(const Sample& one) const {
+    return one.known + one.of_share * share + one.of_zero * zero;
+  }
+  void inform(const std::vector<Sample>& samples) {
+    of_share = of_both = of_zero = 0;
+    for (const Sample& one : samples) {
+      const double weight = 0.5 * one.freedom / square(variance(one));
+      of_share += weight * square(one.of_share);
+      of_both += weight * one.of_share * one.of_zero;
+      of_zero += weight * square(one.of_zero);
     }
   }
-  return sum;
+  /// Twice the logarithm of the restricted likelihood.
+  [[nodiscard]] double likelihood(const std::vector<Sample>& samples) const {
+    double sum = 0;
+    for (const Sample& one : samples) sum -= one.freedom * std::log(variance(one)) + one.squares / variance(one);
+    return sum;
+  }
+  /// Degrees of freedom: twice the square of a variance over the variance of its estimate, the other one unknown.
+  [[nodiscard]] RunScatter scatter() const {
+    const auto freedom = [&](double size, double own, double other_size, double other) {
+      const double left = other_size > 0 && other > 0 ? own - square(of_both) / other : own;
+      return size > 0 ? std::max(1.0, 2 * square(size) * left) : 0;
+    };
+    return {std::sqrt(share), freedom(share, of_share, zero, of_zero), std::sqrt(zero),
+            freedom(zero, of_zero, share, of_share)};
+  }
+};
+
+/// By Fisher's scoring: least squares of the variances, each weighed by what the last round makes of it, none below 0.
+Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) {
+  constexpr int kRounds = 40;
+  Fit fit;
+  for (const Sample& one : samples) {
+    if (with_share && one.of_share > 0) fit.share = std::max(fit.share, one.squares / one.freedom);
+    if (with_zero && one.of_zero > 0) fit.zero = std::max(fit.zero, one.squares / one.freedom / one.of_zero);
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    fit.inform(samples);
+    double share = 0, zero = 0;
+    for (const Sample& one : samples) {
+      const double beyond = 0.5 * (one.squares - one.freedom * one.known) / square(fit.variance(one));
+      share += one.of_share * beyond;
+      zero += one.of_zero * beyond;
+    }
+    const double determinant = fit.of_share * fit.of_zero - square(fit.of_both);
+    double next_share = with_share ? std::max(0.0, share / fit.of_share) : 0, next_zero = 0;
+    if (with_zero && !with_share) next_zero = std::max(0.0, zero / fit.of_zero);
+    if (with_zero && with_share && determinant > 1e-9 * fit.of_share * fit.of_zero) {
+      const double both = (fit.of_zero * share - fit.of_both * zero) / determinant;
+      next_zero = (fit.of_share * zero - fit.of_both * share) / determinant;
+      next_share = next_zero < 0 ? next_share : both;
+      if (next_share < 0) next_share = 0, next_zero = zero / fit.of_zero;
+      next_zero = std::max(0.0, next_zero);
+    }
+    fit.share = 0.5 * (fit.share + next_share);
+    fit.zero = 0.5 * (fit.zero + next_zero);
+  }
+  return fit;
 }
 
 }  // namespace
@@ -36,28 +118,31 @@ double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
   return freedom;
 }
 
-double variance_between(std::span<const std::vector<RunShare>> occlusions) {
-  const double freedom = freedom_between(occlusions);
-  double low = 0, high = 1e-12;
-  if (chi_squared(occlusions, 1e-16) <= freedom) return 0;
-  while (chi_squared(occlusions, high) > freedom) high *= 4;
-  for (int i = 0; i < 40; ++i) {
-    const double middle = 0.5 * (low + high);
-    (chi_squared(occlusions, middle) > freedom ? low : high) = middle;
-  }
-  return high;
+RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Doubt doubt) {
+  const double share_is_worth = doubt == Doubt::usual ? 1 : 0, zero_is_worth = doubt == Doubt::usual ? 2 : 0;
+  const std::vector<Sample> samples = samples_of(occlusions);
+  Fit best;
+  double most = best.likelihood(samples);
+  const bool may_add = std::ranges::any_of(samples, [](const Sample& one) { return one.of_zero > 0; });
+  const auto offer = [&](bool share, bool zero) {
+    if (samples.empty() || (zero && !may_add)) return;
+    const Fit fit = fit_of(samples, share, zero);
+    const double likelihood = fit.likelihood(samples) - (share ? share_is_worth : 0) - (zero ? zero_is_worth : 0);
+    if (likelihood > most) best = fit, most = likelihood;
+  };
+  offer(true, false);
+  offer(false, true);
+  offer(true, true);
+  best.inform(samples);
+  RunScatter scatter = best.scatter();
+  if (!(best.share > 0)) scatter.share_freedom = freedom_between(occlusions);
+  return scatter;
 }
 
-double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions) {
-  if (!(variance_between > 0)) return freedom_between(occlusions);
-  double freedom = 0;
-  for (const auto& runs : occlusions) {
-    double explained = 0;
-    for (const RunShare& run : runs) explained += run.variance / static_cast<double>(runs.size());
-    if (runs.size() > 1)
-      freedom += static_cast<double>(runs.size() - 1) * square(variance_between / (variance_between + explained));
-  }
-  return std::max(1.0, freedom);
+RunScatter scatter_expected(double share, double zero_n, std::span<const std::vector<RunShare>> occlusions) {
+  Fit fit{square(share), square(zero_n)};
+  fit.inform(samples_of(occlusions));
+  return fit.scatter();
 }
 
 }  // namespace kphi::results

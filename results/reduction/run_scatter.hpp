@@ -10,14 +10,26 @@ namespace kphi::results {
 struct RunShare {
   double k = 0;
   double variance = 0;
+  double per_n = 0;            ///< change of that share for 1 N of zero
+  double offset_n = 0;         ///< where the line of the run's thrust on ω² begins, N
+  double offset_variance = 0;  ///< what noise and zero explain of that, N²; 0: offset not known
 };
+
+/// What runs scatter beyond their noise and their zero: standard deviations and the degrees of freedom behind them.
+struct RunScatter {
+  double share = 0, share_freedom = 0;  ///< in proportion to k: mounting, bearing, air
+  double zero_n = 0, zero_freedom = 0;  ///< added to the thrust, N: a zero that errs by more than was told of it
+};
+
 /// Degrees of freedom of the scatter between runs, pooled over occlusions: runs less one for each.
 [[nodiscard]] double freedom_between(std::span<const std::vector<RunShare>> occlusions);
-/// Variance from run to run beyond the explained one, pooled over occlusions: the one at which χ² of the runs about the
-/// mean of their occlusion has its expectation (Mandel, Paule, Anal. Chem. 42 (1970) 1194). 0 without repetitions.
-[[nodiscard]] double variance_between(std::span<const std::vector<RunShare>> occlusions);
-/// Degrees of freedom of that variance: fewer than between the runs where noise and zero explain much of their scatter
-/// (twice its square over the variance of its estimate).
-[[nodiscard]] double freedom_of(double variance_between, std::span<const std::vector<RunShare>> occlusions);
+/// usual: a component is 0 unless the likelihood asks for it; none: it is as large as is likeliest.
+enum class Doubt { usual, none };
+/// Both by restricted maximum likelihood from k and offset of the runs about the means of their occlusion, pooled over
+/// occlusions. docs/science.md has the equations. 0 without repetitions.
+[[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Doubt doubt = Doubt::usual);
+/// How well runs that explain so much of their variance would tell a scatter of this size.
+[[nodiscard]] RunScatter scatter_expected(double share, double zero_n,
+                                          std::span<const std::vector<RunShare>> occlusions);
 
 }  // namespace kphi::results

@@ -13,11 +13,14 @@ void ZeroMovement::add(const StepMean& step) {
   range.moved = step.zero_moved_n;
   range.lowest = std::fmin(range.lowest, step.zero_n);
   range.highest = std::fmax(range.highest, step.zero_n);
+  range.least_u_n = std::fmin(range.least_u_n, step.zero_u_n);
 }
 
 double ZeroMovement::Range::movement() const {
   return !std::isnan(moved) ? moved : highest > lowest ? highest - lowest : 0;
 }
+
+double ZeroMovement::Range::noise_n2() const { return std::isnan(least_u_n) ? 0 : square(2 * least_u_n); }
 
 double ZeroMovement::usual_n() const {
   double squares = 0;
@@ -27,8 +30,10 @@ double ZeroMovement::usual_n() const {
 
 double ZeroMovement::of_run_n(const StepMean& step) const {
   const auto own = of_run_.find({step.propeller, step.occlusion_deg, step.repetition});
-  const double usual = usual_n();
-  return own == of_run_.end() ? usual : std::hypot(usual, own->second.movement()) / std::sqrt(2.0);
+  double wandered = square(usual_n());
+  for (const auto& [run, range] : of_run_) wandered -= range.noise_n2() / runs();
+  if (own != of_run_.end()) wandered = 0.5 * (wandered + square(own->second.movement()) - own->second.noise_n2());
+  return std::sqrt(std::max(0.0, wandered));
 }
 
 void SharedZero::add(double zero_u_n, double begin_s, double end_s, double weight) {

@@ -17,8 +17,9 @@ class ZeroMovement {
  public:
   void add(const StepMean& step);
   [[nodiscard]] double usual_n() const;  ///< root mean square over the runs, N; 0: unknown
-  /// Of the run of this step, N: half by its own movement, which tells all of a jump, half by the usual one, since the
-  /// run's own tells nothing of a walk (root mean square of both).
+  /// How far the zero of the run of this step wandered, N: half by its own movement, which tells all of a jump, half by
+  /// the usual one, since the run's own tells nothing of a walk (root mean square of both); each less what the noise of
+  /// two zeros moves, which SharedZero counts as measured.
   [[nodiscard]] double of_run_n(const StepMean& step) const;
   [[nodiscard]] double runs() const { return static_cast<double>(of_run_.size()); }
 
@@ -26,7 +27,9 @@ class ZeroMovement {
   struct Range {
     double moved = kNotMeasured;  ///< as the run's own zeros say
     double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+    double least_u_n = kNotMeasured;  ///< halfway between two zeros, where their mean counts
     [[nodiscard]] double movement() const;
+    [[nodiscard]] double noise_n2() const;  ///< of the difference of two zeros
   };
   std::map<std::tuple<std::string, double, int>, Range> of_run_;
 };

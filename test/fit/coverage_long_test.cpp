@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "test/fit/bench_study.hpp"
+#include "test/fit/zero_study.hpp"
 
 namespace kphi::fit {
 namespace coverage_long_test {
@@ -11,7 +12,7 @@ TEST(ThousandCampaigns, IntervalsCoverTheTruthAsOftenAsTheySay) {
   for (const auto& [quantity, coverage] : coverage_study({}, 1000)) {
     fmt::print("{:<28} {:5.1f} %, bias {:+.3f} u\n", quantity, coverage.share(), coverage.bias());
     EXPECT_GE(coverage.share(), 93) << quantity;
-    EXPECT_LE(coverage.share(), 97) << quantity;
+    EXPECT_LE(coverage.share(), 98.5) << quantity;
     EXPECT_LT(std::abs(coverage.bias()), 0.2) << quantity;
   }
 }
@@ -33,6 +34,23 @@ TEST(ThousandCampaigns, AStraightTruthIsCalledBentInOneOfTwenty) {
   for (const double percent : {line, lack, trend}) {
     EXPECT_GE(percent, 3);
     EXPECT_LE(percent, 7);
+  }
+}
+
+// A share of 95 % has a deviation of 0.7 % in a thousand: 94 % less two of them. Many cover more than 97 %: part of ±
+// is what the tests of the model find by chance. One jump in a campaign is no bell curve.
+TEST(ThousandCampaigns, CoverOnEightStands) {
+  for (const ScatteringStand& stand : scattering_stands()) {
+    fmt::print("{:<28}", stand.name);
+    for (const auto& [quantity, found] : scatter_study(stand, 1000)) {
+      fmt::print(" {} {:.1f} % {:.2f}", quantity, found.share(), found.u_over_scatter());
+      EXPECT_GE(found.share(), 92.6) << stand.name << ", " << quantity;
+      if (stand.one_jump_n > 0) continue;
+      EXPECT_LE(found.share(), 99.3) << stand.name << ", " << quantity;
+      EXPECT_GE(found.u_over_scatter(), 0.90) << stand.name << ", " << quantity;
+      EXPECT_LE(found.u_over_scatter(), 1.20) << stand.name << ", " << quantity;
+    }
+    fmt::print("\n");
   }
 }
 

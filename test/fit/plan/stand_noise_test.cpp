@@ -57,7 +57,7 @@ TEST(StandNoise, IsStatedByName) {
   EXPECT_EQ(noise.mounting, 0.003);
   EXPECT_EQ(noise.slope_per_deg, -0.0029);
   const auto known = known_noise(noise);
-  EXPECT_EQ(known.size(), 17u);
+  EXPECT_EQ(known.size(), 18u);
   for (const auto& [name, value] : known) EXPECT_NO_THROW(state(noise, fmt::format("{}={}", name, value))) << name;
   for (const char* wrong : {"runs", "runs=", "runs=-1", "runs=x", "run=1", "", "=1", "noise-n=nan", "noise-n=inf"}) {
     try {

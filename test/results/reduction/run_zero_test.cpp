@@ -61,4 +61,29 @@ TEST(SharedZero, WithoutTimesIsThatOfARectangleAndAddsWhatWasMeasured) {
   EXPECT_EQ(SharedZero().u_n(1), 0);
 }
 
+/// A run whose zeros, each uncertain by `u_n`, are `moved_n` apart.
+std::vector<StepMean> run_of(int repetition, double moved_n, double u_n) {
+  std::vector<StepMean> steps;
+  for (const double part : {0.0, 0.5, 1.0}) {
+    StepMean step;
+    step.repetition = repetition;
+    step.zero_moved_n = moved_n;
+    step.zero_u_n = u_n * std::hypot(1 - part, part);
+    steps.push_back(step);
+  }
+  return steps;
+}
+
+TEST(ZeroMovement, OfZerosThatAreNoisyIsNoWander) {
+  ZeroMovement noisy, wandering;
+  for (const int repetition : {1, 2}) {
+    for (const StepMean& step : run_of(repetition, 0.01 * std::sqrt(2), 0.01)) noisy.add(step);
+    for (const StepMean& step : run_of(repetition, 0.05, 0.01)) wandering.add(step);
+  }
+  EXPECT_NEAR(noisy.usual_n(), 0.01 * std::sqrt(2), 1e-12);
+  EXPECT_NEAR(noisy.of_run_n(run_of(1, 0, 0).front()), 0, 1e-9);
+  EXPECT_NEAR(wandering.of_run_n(run_of(1, 0, 0).front()), std::sqrt(0.05 * 0.05 - 2e-4), 1e-9);
+  EXPECT_NEAR(wandering.of_run_n(run_of(3, 0, 0).front()), std::sqrt(0.05 * 0.05 - 2e-4), 1e-9) << "unknown: as usual";
+}
+
 }  // namespace kphi::results::run_zero_test
