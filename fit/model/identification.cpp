@@ -198,16 +198,13 @@ std::vector<OcclusionCoefficient> coefficients_of(std::span<const StepMean> step
   }
   repeatability = fit::repeatability(std::move(scatter), {movement.usual_n(), 0, movement.runs()});
   const double mounting = options.mounting.value_or(kAssumedMounting);
-  if (!repeatability.repeated) {
-    repeatability.between.u = mounting;
-    repeatability.between_known = true;
-  }
+  if (!repeatability.repeated) repeatability.between.u = mounting;
   repeatability.mounted_once = options.mounted_once && repeatability.repeated;
   if (repeatability.mounted_once) repeatability.mounting = mounting;
   repeatability.mounting_assumed = !options.mounting && (repeatability.mounted_once || !repeatability.repeated);
   for (std::size_t i = 0; i < table.size(); ++i) {
     OcclusionCoefficient& row = table[i];
-    if (repeatability.between_known) row.standard_error = repeatability.independent_u(i);
+    row.standard_error = repeatability.independent_u(i);
     row.air = air_of(row.measured);
   }
   return table;

@@ -151,7 +151,7 @@ Repeatability repeatability(std::vector<AngleScatter> angles, const Estimate& ze
   for (const AngleScatter& angle : angles)
     if (angle.k != 0) shares.push_back(shares_of(angle));
   result.angles = std::move(angles);
-  result.repeated = result.between_known = results::freedom_between(shares) > 0;
+  result.repeated = results::freedom_between(shares) > 0;
   if (!result.repeated) return result;
   const results::RunScatter scatter = results::scatter_between(shares);
   result.between = {0, scatter.share, scatter.share_freedom};

@@ -71,11 +71,10 @@ struct AngleScatter {
 
 struct Repeatability {
   std::vector<AngleScatter> angles;
-  Estimate between;        ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
-  Estimate zero_beyond{};  ///< and of an error that adds to the thrust, beyond what is told of the zero, N
-  bool repeated = false;   ///< at least one φ was measured more than once
-  bool between_known = false;        ///< from repetitions, given or assumed
-  bool mounted_once = false;         ///< for all repetitions of a φ: `between` does not hold the mounting
+  Estimate between;           ///< u: standard deviation from run to run as a share of k, beyond noise and zero; value 0
+  Estimate zero_beyond{};     ///< and of an error that adds to the thrust, beyond what is told of the zero, N
+  bool repeated = false;      ///< at least one φ was measured more than once
+  bool mounted_once = false;  ///< for all repetitions of a φ: `between` does not hold the mounting
   std::optional<double> mounting{};  ///< then: standard deviation of k from mounting to mounting, as a share
   bool mounting_assumed = false;     ///< nobody gave it
   Estimate zero_movement{};          ///< of a run's zero, usually, N; freedom: the runs behind it

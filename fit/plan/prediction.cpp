@@ -66,7 +66,6 @@ void take_scatter(const profiles::Campaign& campaign, const StandNoise& noise, R
   const bool remounts = campaign.order.remount_each_repetition;
   const double u = remounts ? std::hypot(noise.runs, noise.mounting.value_or(kAssumedMounting)) : noise.runs;
   all.repeated = campaign.repetitions > 1;
-  all.between_known = true;
   std::vector<std::vector<results::RunShare>> shares;
   for (const AngleScatter& angle : all.angles) {
     const double zero = angle.runs.front().zero_u_n * angle.zero_sensitivity;

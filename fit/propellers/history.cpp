@@ -186,7 +186,7 @@ Estimate pooled(std::span<const Fitted> campaigns, Estimate Repeatability::*part
   double squares = 0, freedom = 0, n = 0;
   for (const Fitted& one : campaigns) {
     const Estimate& own = one.identification.repeatability.*part;
-    if (!one.identification.repeatability.between_known || !std::isfinite(own.freedom)) continue;
+    if (!one.identification.repeatability.repeated || !std::isfinite(own.freedom)) continue;
     squares += own.u * own.u;
     freedom += own.freedom;
     ++n;
@@ -203,9 +203,8 @@ class OwnErrors {
     if (between.freedom > 0) {
       repeatability.between = between;
       repeatability.zero_beyond = zero_beyond;
-      repeatability.between_known = true;
     }
-    sources_ = error_sources(repeatability, one.analysis.speed, {});
+    sources_ = error_sources(repeatability, one.analysis.speed, BenchUncertainty::none());
   }
   [[nodiscard]] Estimate k(std::size_t i) const {
     std::vector<double> weights(one_.identification.table.size());

@@ -125,7 +125,7 @@ void add_repeatability(ErrorSources& sources, const Repeatability& all) {
   for (const AngleScatter& angle : all.angles) {
     const double runs = static_cast<double>(angle.runs.size());
     noise.effects.push_back({angle.within_u(), 1, angle.within.freedom > 0 ? angle.within.freedom : kEndless});
-    between.effects.push_back({all.between_known ? all.between.u / std::sqrt(runs) : kUnknown, angle.k});
+    between.effects.push_back({all.between.u / std::sqrt(runs), angle.k});
     zero.effects.push_back({std::hypot(angle.zero_u_n, all.zero_beyond.u / std::sqrt(runs)), angle.zero_sensitivity});
   }
   sources.sources.insert(sources.sources.end(), {noise, between, zero});

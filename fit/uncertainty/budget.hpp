@@ -68,6 +68,9 @@ struct BenchUncertainty {
   /// Relative, of k from mounting to mounting; repetitions that are remounted tell it better. Given to
   /// IdentificationOptions, too.
   std::optional<double> mounting;
+
+  /// Known to be without any of them.
+  [[nodiscard]] static BenchUncertainty none() { return {0.0, "", 0.0, 0.0, 0.0, 0.0, 0.0}; }
 };
 
 /// "NAME=VALUE" with NAME one of calibration, cross-axis, alignment-deg, clock, density, mounting. Throws

@@ -58,9 +58,10 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
         "k {} with speed, by {} at {}° from {:.0f} to {:.0f} RPM: near {:.0f} RPM the thrust is {} {} than k says; {}",
         change > 0 ? "rises" : "falls", in_percent(change), one.phi_deg, rpm(one.levels.front()),
         rpm(one.levels.back()), rpm(one.levels.front()), in_percent(slowest), slowest < 0 ? "lower" : "higher",
-        tests.trend && !identification.alone() ? "the flying library follows it (speed_trend); for a stack that cannot, fit the speeds of "
-                      "your flight alone (--speed-range-rpm)"
-                    : "fit the speeds of your flight alone (--speed-range-rpm)");
+        tests.trend && !identification.alone()
+            ? "the flying library follows it (speed_trend); for a stack that cannot, fit the speeds of "
+              "your flight alone (--speed-range-rpm)"
+            : "fit the speeds of your flight alone (--speed-range-rpm)");
   }
   if (count == 0) return std::nullopt;
   clearest.p = std::min(1.0, count * clearest.p);

@@ -230,7 +230,7 @@ TEST_F(SecondBench, RunsACampaignAndFitsWhatTheStandWasBuiltWith) {
   const auto file = YAML::LoadFile(folder + "/coefficients.yaml");
   const double expanded = file["K_T"]["expanded_95"].as<double>();
   EXPECT_NEAR(file["K_T"]["value"].as<double>(), test::kTrueK5x3, std::max(2 * expanded, 0.003 * test::kTrueK5x3));
-  EXPECT_LT(expanded, 0.01 * test::kTrueK5x3);
+  EXPECT_LT(expanded, 0.02 * test::kTrueK5x3) << "of which 1.7 % are assumed";
 }
 
 TEST_F(SecondBench, StopsAndCoastsWhenTheScaleFallsSilentInARun) {

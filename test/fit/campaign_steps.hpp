@@ -53,13 +53,6 @@ struct CampaignTruth {
   return steps;
 }
 
-/// A stand without any error that its steps do not show.
-inline BenchUncertainty exact_bench() {
-  BenchUncertainty bench;
-  bench.cell_calibration = bench.cross_axis = bench.alignment_rad = bench.motor_clock = bench.mounting = 0;
-  return bench;
-}
-
 inline Fitted analysed(Identification found) {
   Analysis analysis = analyse(found);
   return {std::move(found), std::move(analysis)};

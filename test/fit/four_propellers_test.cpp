@@ -44,7 +44,7 @@ Fitted measured(const std::string& name, int seed) {
   (void)daq::run_campaign(bench, shortened(name), config, results, person, silence, [] { return false; });
   Identification found = identify(results::read_steps(results.steps()));
   AnalysisOptions options;
-  options.bench = exact_bench();
+  options.bench = BenchUncertainty::none();
   options.bench.motor_clock = 2e-4;
   Analysis analysis = analyse(found, options);
   return {std::move(found), std::move(analysis)};

@@ -115,7 +115,7 @@ TEST(AveragedRuns, TellNoScatterWhereTheirNumberIsUnknown) {
   EXPECT_FALSE(repetitions_averaged(means));
   const Identification found = identify(means);
   EXPECT_FALSE(found.repeatability.repeated);
-  EXPECT_FALSE(found.repeatability.between_known);
+  EXPECT_TRUE(found.repeatability.mounting_assumed);
   EXPECT_EQ(found.table.front().repetitions, 1u);
 }
 

@@ -23,7 +23,7 @@ std::string words_after(int runs, std::vector<std::string> wishes = {}) {
   std::vector<Wish> wanted;
   for (const std::string& text : wishes) wanted.push_back(parse_wish(text));
   const profiles::Campaign campaign = planned_campaign();
-  return to_words(reached_so_far(first_runs(campaign, runs), campaign, exact_bench(), wanted));
+  return to_words(reached_so_far(first_runs(campaign, runs), campaign, BenchUncertainty::none(), wanted));
 }
 
 TEST(Outlook, SaysMoreWithEveryRun) {
@@ -41,7 +41,7 @@ TEST(Outlook, OfStepsThatEndByThemselvesCountsThemAsTheyWere) {
   const auto steps = first_runs(campaign, 9);  // of 2 s
   campaign.profile.until = profiles::Until{0.002, Seconds(0.7)};
   campaign.profile.dwell = Seconds(20);
-  EXPECT_THAT(to_words(reached_so_far(steps, campaign, exact_bench(), {})), HasSubstr(" in 8 min"));
+  EXPECT_THAT(to_words(reached_so_far(steps, campaign, BenchUncertainty::none(), {})), HasSubstr(" in 8 min"));
 }
 
 TEST(Outlook, TellsHowFarItIsToAWish) {
@@ -59,10 +59,10 @@ TEST(Outlook, OfOneMoreRepetitionIsBetterByTheRootOfTheirNumber) {
   options.mounting = 0;
   Identification identification = identify(simulate(campaign, kStand, 2), options);
   AnalysisOptions known;
-  known.bench = exact_bench();
+  known.bench = BenchUncertainty::none();
   Analysis analysis = analyse(identification, known);
   const Fitted fitted{std::move(identification), std::move(analysis)};
-  const auto more = one_more_repetition(fitted, campaign, {}, exact_bench());
+  const auto more = one_more_repetition(fitted, campaign, {}, BenchUncertainty::none());
   ASSERT_TRUE(more);
   EXPECT_NEAR(more->minutes, 7, 1e-9) << "five runs of 84 s";
   EXPECT_EQ(more->mountings, 5);

@@ -25,7 +25,7 @@ StandNoise known_stand() {
 }
 
 double share(const profiles::Campaign& campaign, const StandNoise& noise, Kind kind, double phi_deg = 0) {
-  return share_of(Prediction(campaign, noise, exact_bench()).of({kind, phi_deg}));
+  return share_of(Prediction(campaign, noise, BenchUncertainty::none()).of({kind, phi_deg}));
 }
 
 TEST(Wishes, AreReadAsPeopleWriteThem) {
@@ -58,9 +58,9 @@ TEST(Prediction, GrowsMoreCertainWithEverythingThatCosts) {
 TEST(Prediction, OfKTIsWhatThePaperAndPencilSay) {
   StandNoise noise = known_stand();
   noise.noise_n = noise.zero_n = 0;
-  Budget K_T = Prediction(planned_campaign(), noise, exact_bench()).of({Kind::thrust_coefficient, 0});
+  Budget K_T = Prediction(planned_campaign(), noise, BenchUncertainty::none()).of({Kind::thrust_coefficient, 0});
   EXPECT_NEAR(K_T.combined() / K_T.value, std::hypot(0.002, 0.001 / std::sqrt(3)), 1e-9) << "one mounting, three runs";
-  K_T = Prediction(planned_campaign({0, 45, 90, 180, 270}, 3, true), noise, exact_bench())
+  K_T = Prediction(planned_campaign({0, 45, 90, 180, 270}, 3, true), noise, BenchUncertainty::none())
             .of({Kind::thrust_coefficient, 0});
   EXPECT_NEAR(K_T.combined() / K_T.value, std::hypot(0.002, 0.001) / std::sqrt(3), 1e-9) << "three mountings";
 }
@@ -78,7 +78,7 @@ TEST(Prediction, HasTheErrorsThatNoRepetitionShows) {
   EXPECT_THAT(ratio.assumed(), ::testing::IsEmpty()) << "they cancel, too";
   StandNoise noise = known_stand();
   noise.campaigns = 0.02;
-  EXPECT_EQ(largest_row(Prediction(planned_campaign(), noise, exact_bench()).of({Kind::k, 90}))->source,
+  EXPECT_EQ(largest_row(Prediction(planned_campaign(), noise, BenchUncertainty::none()).of({Kind::k, 90}))->source,
             "campaign to campaign");
 }
 
