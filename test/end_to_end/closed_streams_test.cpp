@@ -112,8 +112,8 @@ class LeftOutput : public testing::Test, protected VirtualCampaign {
 TEST_F(LeftOutput, IsAFailureOfWhoeverHasDataToPrint) {
   for (const char* shell : {GONE R"(exec "$@" >&3 3>&-)", R"(exec "$@" >/dev/full)", R"(exec "$@" >&-)"}) {
     for (const std::vector<std::string>& words :
-         {std::vector<std::string>{"fit", campaign_, "--no-report"},
-          {"fit", campaign_, "--no-report", "--json"},
+         {std::vector<std::string>{"fit", campaign_, "--accept", "--no-report"},
+          {"fit", campaign_, "--accept", "--no-report", "--json"},
           {"replay", campaign_},
           {"info", campaign_},
           {"--help"},

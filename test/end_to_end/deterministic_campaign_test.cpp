@@ -26,7 +26,7 @@ std::map<std::string, std::string> contents(const std::filesystem::path& folder)
 
 std::map<std::string, std::string> campaign_on(const std::string& bench, const std::string& campaign) {
   const VirtualCampaign here(campaign, bench);
-  (void)ran({kphi(), "fit", ran(here.command()).folder()});
+  (void)ran({kphi(), "fit", "--accept", ran(here.command()).folder()});
   return contents(here.path("out"));
 }
 
@@ -97,7 +97,7 @@ TEST(DeterministicCampaign, APlateMountedOnceScattersOnceAndARemountedOneWithEac
 }
 
 TEST(DeterministicCampaign, NoChangedBitOfAFittedFolderPassesUnnoticed) {
-  const VirtualCampaign here(short_campaign_text("0, 90, 180", 1), deterministic_config(5).text);
+  const VirtualCampaign here(short_campaign_text("0, 45, 90, 180", 1), deterministic_config(5).text);
   const std::string folder = ran(here.command()).folder();
   constexpr const char* kChanged = "SHA-256 does not match the journal";
   const std::string fitted = ran({kphi(), "fit", folder}).out, replayed = ran({kphi(), "replay", folder}).out;
