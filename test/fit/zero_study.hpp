@@ -109,6 +109,7 @@ inline std::map<std::string, Scatter> scatter_study(const ScatteringStand& stand
   const CampaignTruth truth;
   std::map<std::string, Scatter> table;
   AnalysisOptions options;
+  options.bench = BenchUncertainty::none();
   options.prediction_deg = {135};
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
     const Identification found = identify(scattering_campaign(stand, seed));

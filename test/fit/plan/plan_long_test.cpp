@@ -33,7 +33,7 @@ TEST(TwoHundredCampaigns, ScatterAsThePlanSaidWithinFifteenPercent) {
     const StandNoise noise = piloted(stand, 60, 7000);
     int number = 0;
     for (const profiles::Campaign& campaign : designs()) {
-      const Prediction prediction(campaign, noise, {});
+      const Prediction prediction(campaign, noise, BenchUncertainty::none());
       const std::vector<Found> found = found_by(campaign, stand, 200, told(), 50'000);
       const std::string name = fmt::format("{:<34} campaign {}", stand.name, ++number);
       expect_as_predicted(prediction, found, 0.85, name);
@@ -51,7 +51,7 @@ TEST(TwoHundredCampaigns, ThatTakeNoMoreTimeThanKNeedsScatterAsThePlanSaid) {
     for (const int repetitions : {2, 3}) {
       const profiles::Campaign campaign =
           with_until(planned_campaign({0, 45, 90, 180, 270}, repetitions, stand.mounting > 0));
-      const Prediction prediction(campaign, noise, {});
+      const Prediction prediction(campaign, noise, BenchUncertainty::none());
       double bench_s = 0;
       const std::vector<Found> found = found_by(campaign, stand, 200, told(), 50'000, until_certain, &bench_s);
       const double minutes = profiles::make_plan(as_expected(campaign, noise), {}).bench.value() / 60;
@@ -69,7 +69,7 @@ TEST(TwoHundredCampaigns, FindTheBendThatThePlanSaidTheyWould) {
     const StandNoise noise = piloted(stand, 30, 7000);
     for (const profiles::Campaign& campaign : designs()) {
       SimulatedStand bent = stand;
-      bent.bend = Prediction(campaign, noise, {}).bend_seen();
+      bent.bend = Prediction(campaign, noise, BenchUncertainty::none()).bend_seen();
       IdentificationOptions options;
       options.mounted_once = !campaign.order.remount_each_repetition;
       if (options.mounted_once) options.mounting = stand.mounting;

@@ -207,6 +207,7 @@ inline StandNoise piloted(const SimulatedStand& stand, int n, std::uint64_t seed
   for (int i = 0; i < n; ++i) {
     IdentificationOptions options;
     options.mounted_once = stand.mounting == 0;
+    if (options.mounted_once) options.mounting = stand.mounting;
     fitted.push_back(analysed(identify(simulate(campaign, stand, seed + static_cast<std::uint64_t>(i)), options)));
   }
   std::vector<PilotCampaign> pilots;
@@ -238,6 +239,7 @@ inline std::vector<Found> found_by(const profiles::Campaign& campaign, const Sim
   std::vector<Found> found(told.size());
   for (int i = 0; i < n; ++i) {
     AnalysisOptions options;
+    options.bench = BenchUncertainty::none();
     options.prediction_deg = {135};
     IdentificationOptions known;
     known.mounted_once = !campaign.order.remount_each_repetition;

@@ -121,7 +121,7 @@ TEST(Prediction, OfThePilotsOwnCampaignIsWhatItsFitSays) {
   const StandNoise noise = piloted(stand, 20, 1);
   const std::vector<Found> found =
       found_by(planned_campaign(), stand, 50, {{Kind::thrust_coefficient, 0}, {Kind::slope, 0}}, 1000);
-  const Prediction prediction(planned_campaign(), noise, {});
+  const Prediction prediction(planned_campaign(), noise, BenchUncertainty::none());
   EXPECT_NEAR(prediction.of({Kind::thrust_coefficient, 0}).combined(), found[0].stated, 0.25 * found[0].stated);
   EXPECT_NEAR(prediction.of({Kind::slope, 0}).combined(), found[1].stated, 0.25 * found[1].stated);
 }

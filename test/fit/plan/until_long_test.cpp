@@ -53,7 +53,9 @@ Result measured(SimulatedStand stand, int propeller, const Protocol& protocol, i
                                 protocol.again ? AskAgain(while_it_moves_k) : AskAgain{});
     std::set<std::pair<double, int>> runs;
     for (const auto& step : steps) runs.emplace(step.occlusion_deg, step.repetition);
-    const Analysis analysis = analyse(identify(steps, options));
+    AnalysisOptions known;
+    known.bench = BenchUncertainty::none();
+    const Analysis analysis = analyse(identify(steps, options), known);
     const Budget &K_T = analysis.coefficients.front(), &slope = analysis.line.slope;
     sum.runs += static_cast<double>(runs.size());
     sum.K_T += share_of(K_T);
