@@ -178,8 +178,9 @@ Choice largest(const PlanQuestion& question, const std::vector<Wanted>& told) {
 
 std::string row_words(const Budget& budget) {
   const BudgetRow* row = largest_row(budget);
-  return row == nullptr ? "nothing known"
-                        : fmt::format("{} ({:.0f} % of the variance)", row->source, 100 * budget.share(*row));
+  if (row == nullptr) return "nothing known";
+  return fmt::format("{} ({:.0f} % of the variance){}{}", row->source, 100 * budget.share(*row),
+                     row->remedy.empty() ? "" : ": ", row->remedy);
 }
 
 std::string occlusion_words(const Campaign& campaign) {
