@@ -51,34 +51,36 @@ std::vector<std::string> broken_laws_of_power(const Identification& identificati
     efficiency.add(shaft_w > 0 ? shaft_w : std::numeric_limits<double>::quiet_NaN(), electrical_w(step));
   }
   const double merit = of_shaft.share(), least = of_supply.share(), motor = efficiency.share();
-  const auto times = [](double share) { return two_digits(share); };
   if (merit > kRoom * kLargestFigureOfMerit)
     broken.push_back(
-        fmt::format("thrust and torque are impossible: by its torque the propeller makes {} times the thrust "
-                    "power of an ideal disk of {:g} inches; check the units of thrust, torque and speed, "
-                    "the torque's lever arm, and the diameter",
-                    times(merit), identification.diameter_in));
+        fmt::format("thrust and torque are impossible: an ideal disk of {:g} inches needs {} times the power that the "
+                    "torque gives; "
+                    "check the units of thrust, torque and speed, the torque's lever arm, and the diameter",
+                    identification.diameter_in, two_digits(merit)));
   if (merit < kLeastFigureOfMerit / kRoom)
     broken.push_back(
-        fmt::format("thrust and torque do not belong together: only {} % of the shaft's power goes into the "
-                    "thrust, usual is 30 to 70 %; check the units of thrust, torque and speed",
+        fmt::format("thrust and torque do not belong together: {} % of the shaft's power goes into the thrust, usual "
+                    "is 30 to 70 %; "
+                    "check the units of thrust, torque and speed",
                     two_digits(100 * merit)));
   if (least > kRoom)
     broken.push_back(
-        fmt::format("thrust and electrical power are impossible: of its power an ideal disk of {:g} inches "
-                    "would make less thrust ({} times the power is missing); check the units of thrust, "
-                    "voltage and current, and the current's shunt",
-                    identification.diameter_in, times(least)));
+        fmt::format("thrust and electrical power are impossible: an ideal disk of {:g} inches needs {} times the power "
+                    "that the motor "
+                    "took; check the units of thrust, voltage and current, and the current's shunt",
+                    identification.diameter_in, two_digits(least)));
   if (least < kLeastOfElectrical / kRoom)
     broken.push_back(
-        fmt::format("thrust and electrical power do not belong together: only {} % of the power goes into "
-                    "the thrust; check the units of thrust, voltage and current",
+        fmt::format("thrust and electrical power do not belong together: {} % of the power goes into the thrust; check "
+                    "the units of "
+                    "thrust, voltage and current",
                     two_digits(100 * least)));
   if (motor > kRoom * kLargestEfficiency)
     broken.push_back(
-        fmt::format("torque and electrical power are impossible: the shaft gives {} times the power that the "
-                    "motor takes; check speed (pole count), torque and current",
-                    times(motor)));
+        fmt::format("torque and electrical power are impossible: the shaft gives {} times the power that the motor "
+                    "takes; check speed "
+                    "(pole count), torque and current",
+                    two_digits(motor)));
   return broken;
 }
 

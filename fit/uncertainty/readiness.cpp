@@ -136,7 +136,7 @@ std::optional<Doubt> of_untested_curve(const Identification& identification) {
   constexpr std::size_t kLeastRows = 4;
   if (identification.alone() || identification.table.size() >= kLeastRows) return std::nullopt;
   return Doubt{Readiness::with_care,
-               fmt::format("k(φ) between the occlusions is not tested: of {} measured angles nobody knows which way it "
+               fmt::format("k(φ) between the occlusions is not tested: {} measured angles do not tell which way it "
                            "bends; measure another occlusion between them",
                            identification.table.size())};
 }

@@ -216,7 +216,7 @@ ThrustError thrust_error(const Identification& identification, const ThrustEvide
 }
 
 std::string words(const ThrustError& error) {
-  if (std::isnan(error.share)) return "by how much the thrust may be wrong is not known";
+  if (std::isnan(error.share)) return "error of the thrust unknown";
   std::string text = fmt::format("thrust within {} % (95 %)", two_digits(100 * error.share));
   if (error.parts.empty()) return text;
   const ThrustErrorPart& largest = error.parts.front();

@@ -83,7 +83,7 @@ TEST(FlightReadiness, SaysWhatIsWrongWithACampaign) {
             [truth = StudyTruth()](auto& step) {
               if (step.occlusion_deg == 0) step.thrust_n *= truth.k(45) / truth.k(0);
             }},
-           {Readiness::not_yet, "times the thrust power of an ideal disk", [](auto& step) { step.torque_nm *= 0.1; },
+           {Readiness::not_yet, "times the power that the torque gives", [](auto& step) { step.torque_nm *= 0.1; },
             kCampaigns},
            {Readiness::not_yet, "makes C_T =", [](auto& step) { step.thrust_n *= 9.81; }, kCampaigns},
        }) {
