@@ -28,7 +28,7 @@ std::string verdict_box(const FlightReadiness& flight) {
                   : flight.readiness() == Readiness::fit_to_fly ? "Fit to fly"
                   : flight.readiness() == Readiness::not_yet    ? "Do not fly yet"
                                                                 : "Fly with care");
-  std::string number = words(flight.error);
+  std::string number = number_words(flight);
   number.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(number.front())));
   html += "<p><b>" + typeset(number) + ".</b></p>\n";
   for (const Doubt& doubt : flight.doubts) html += "<p>" + typeset(doubt.text) + "</p>\n";

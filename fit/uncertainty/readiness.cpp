@@ -196,8 +196,13 @@ Readiness FlightReadiness::readiness() const {
   return std::max(worst, by_number);
 }
 
+std::string number_words(const FlightReadiness& flight) {
+  const bool impossible = !flight.doubts.empty() && flight.doubts.front().readiness == Readiness::not_yet;
+  return (impossible ? "not counting what is said below, " : "") + words(flight.error);
+}
+
 std::string verdict_line(const FlightReadiness& flight) {
-  return fmt::format("{}: {}", words(flight.readiness()), words(flight.error));
+  return fmt::format("{}: {}", words(flight.readiness()), number_words(flight));
 }
 
 const char* words(Readiness readiness) {

@@ -58,6 +58,9 @@ struct ModelTests {
 [[nodiscard]] FlightReadiness flight_readiness(const Identification& identification, const ModelTests& tests,
                                                const ReadinessLimits& limits = {});
 
+/// The number in words; with a doubt that has no size: "not counting what is said below, thrust within 1.4 % …".
+[[nodiscard]] std::string number_words(const FlightReadiness& flight);
+
 /// "fit to fly: thrust within 1.4 % (95 %), …": the verdict in one line.
 [[nodiscard]] std::string verdict_line(const FlightReadiness& flight);
 

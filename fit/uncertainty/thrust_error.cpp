@@ -118,6 +118,7 @@ class Account {
     const double flown = curve_ ? flown_at(phi_deg) : k;
     for (double& weight : weights) weight /= flown;
     Budget scatter = evidence_.sources.budget("thrust", "1", 1, weights);
+    const bool known = !std::isnan(scatter.combined());
     const auto between = fmt::format("{:g}° and {:g}°", table[chord.before].phi_deg, table[chord.after].phi_deg);
     const auto add = [&](const char* source, double u, double freedom, std::string remedy) {
       scatter.rows.push_back({.source = source,
@@ -156,6 +157,7 @@ class Account {
       error.parts.push_back({row.source, factor * row.contribution(), row.remedy});
     error.share =
         folded(error.share, scatter.combined() * factor / coverage_factor(std::numeric_limits<double>::infinity()));
+    if (!known) error.share = std::numeric_limits<double>::quiet_NaN();
     std::erase_if(error.parts, [](const ThrustErrorPart& part) { return !(part.share > 0); });
     std::ranges::stable_sort(error.parts, std::greater{}, &ThrustErrorPart::share);
     return error;

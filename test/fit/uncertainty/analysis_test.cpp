@@ -177,6 +177,7 @@ TEST(Analysis, OfATableWithoutErrorsInventsNone) {
   EXPECT_NEAR(analysis.covariance[1][2], -2.3818187621692447e-06, 1e-18);
   EXPECT_TRUE(std::isnan(analysis.shape.mismatch.u)) << "K_T's error is unknown";
   EXPECT_EQ(analysis.flight.readiness(), Readiness::with_care);
+  EXPECT_TRUE(std::isnan(analysis.flight.error.share)) << "nobody knows it";
   const std::string file = format_coefficients(fitted, {});
   EXPECT_THAT(file, testing::HasSubstr("covariance: unknown"));
   EXPECT_FALSE(compensation::parse_coefficients(file, "k.yaml").curve.has_uncertainty());

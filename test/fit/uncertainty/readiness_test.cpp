@@ -126,7 +126,8 @@ TEST(FlightReadiness, StandsAtTheTopOfScreenFileAndReport) {
                                     "mount each repetition anew\n"));
   EXPECT_THAT(format_coefficients(fitted, {}), HasSubstr("verdict: fit_to_fly\n  doubts: []\n"));
   fitted.analysis.flight.doubts = {{Readiness::not_yet, "a \"plate\" is <bent>"}};
-  EXPECT_THAT(headline_text(fitted), ::testing::StartsWith("verdict    do not fly yet: thrust"));
+  EXPECT_THAT(headline_text(fitted),
+              ::testing::StartsWith("verdict    do not fly yet: not counting what is said below, thrust"));
   EXPECT_THAT(headline_text(fitted), HasSubstr("\n           a \"plate\" is"));
   EXPECT_THAT(format_coefficients(fitted, {}), HasSubstr("  doubts: [\"a \\\"plate\\\" is <bent>\"]\n"));
   const std::string page = format_report(fitted, {});
