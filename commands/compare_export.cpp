@@ -126,7 +126,9 @@ ExitCode compare_truth(const CompareRequest& request) {
       check_against_truth(loaded(log_of(request.results.front()), request.results.front()), request.truth);
   fmt::print("{}", check.text);
   if (check.close) return ExitCode::ok;
-  fmt::print(stderr, "kphi: too far from the truth: K_T must agree within 0.5 %, the slope within 2 %\n");
+  fmt::print(stderr,
+             "kphi: too far from the truth: beyond what is allowed, the result's own ± or, if larger, 0.5 % of K_T and "
+             "2 % of the slope\n");
   return ExitCode::data_rejected;
 }
 

@@ -72,7 +72,7 @@ struct Comparison {
 /// A result beside the truth of the simulated bench.
 struct TruthCheck {
   std::string text;    ///< "K_T    found …  true …  +0.007 %", one line per number
-  bool close = false;  ///< K_T within 0.5 %, the slope within 2 %
+  bool close = false;  ///< K_T within 0.5 %, the slope within 2 %, or either within its own ± (95 %) where that is more
 };
 
 /// `truth`: file of `kphi sim --truth`. Throws ConfigurationError for a file without the propeller of `found`.

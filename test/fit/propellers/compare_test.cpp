@@ -62,6 +62,11 @@ TEST(Compare, MeasuresTheDistanceFromTheSimulatedTruth) {
   EXPECT_THAT(check(1.507e-6, -4.07e-9).text, HasSubstr("+0.467 %"));
   EXPECT_FALSE(check(1.508e-6, -4.0e-9).close) << "0.53 %";
   EXPECT_FALSE(check(1.5e-6, -4.09e-9).close) << "2.25 %";
+  const auto told = [&](double u) {
+    return check_against_truth(result({{"K_T", "", 1.515e-6, u}, {"slope", "", -4e-9, 0}}), truth).close;
+  };
+  EXPECT_TRUE(told(0.8e-8)) << "1 % off, 1.05 % told";
+  EXPECT_FALSE(told(0.7e-8)) << "0.91 % told";
   ComparedResult other = result({{"K_T", "", 1, 0}});
   other.propeller = "6x3";
   EXPECT_THROW((void)check_against_truth(other, truth), ConfigurationError);
