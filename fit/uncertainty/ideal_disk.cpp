@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -50,37 +52,34 @@ std::vector<std::string> broken_laws_of_power(const Identification& identificati
     of_supply.add(ideal_w, electrical_w(step));
     efficiency.add(shaft_w > 0 ? shaft_w : std::numeric_limits<double>::quiet_NaN(), electrical_w(step));
   }
-  const double merit = of_shaft.share(), least = of_supply.share(), motor = efficiency.share();
-  if (merit > kRoom * kLargestFigureOfMerit)
-    broken.push_back(
-        fmt::format("thrust and torque are impossible: an ideal disk of {:g} inches needs {} times the power that the "
-                    "torque gives; "
-                    "check the units of thrust, torque and speed, the torque's lever arm, and the diameter",
-                    identification.diameter_in, two_digits(merit)));
-  if (merit < kLeastFigureOfMerit / kRoom)
-    broken.push_back(
-        fmt::format("thrust and torque do not belong together: {} % of the shaft's power goes into the thrust, usual "
-                    "is 30 to 70 %; "
-                    "check the units of thrust, torque and speed",
-                    two_digits(100 * merit)));
-  if (least > kRoom)
-    broken.push_back(
-        fmt::format("thrust and electrical power are impossible: an ideal disk of {:g} inches needs {} times the power "
-                    "that the motor "
-                    "took; check the units of thrust, voltage and current, and the current's shunt",
-                    identification.diameter_in, two_digits(least)));
-  if (least < kLeastOfElectrical / kRoom)
-    broken.push_back(
-        fmt::format("thrust and electrical power do not belong together: {} % of the power goes into the thrust; check "
-                    "the units of "
-                    "thrust, voltage and current",
-                    two_digits(100 * least)));
-  if (motor > kRoom * kLargestEfficiency)
-    broken.push_back(
-        fmt::format("torque and electrical power are impossible: the shaft gives {} times the power that the motor "
-                    "takes; check speed "
-                    "(pole count), torque and current",
-                    two_digits(motor)));
+  struct Law {
+    double share, least, largest;
+    const char *too_small, *too_large;  ///< {} is the share, too small in percent
+  };
+  for (const Law& law : std::array<Law, 3>{{
+           {of_shaft.share(), kLeastFigureOfMerit, kLargestFigureOfMerit,
+            "thrust and torque do not belong together: {} % of the shaft's power goes into the thrust, usual is 30 to "
+            "70 %; "
+            "check the units of thrust, torque and speed",
+            "thrust and torque are impossible: an ideal disk of this diameter needs {} times the power that the torque "
+            "gives; check the units of thrust, torque and speed, the torque's lever arm, and the diameter"},
+           {of_supply.share(), kLeastOfElectrical, kLargestFigureOfMerit,
+            "thrust and electrical power do not belong together: {} % of the power goes into the thrust; check the "
+            "units of "
+            "thrust, voltage and current",
+            "thrust and electrical power are impossible: an ideal disk of this diameter needs {} times the power that "
+            "the "
+            "motor took; check the units of thrust, voltage and current, and the current's shunt"},
+           {efficiency.share(), 0, kLargestEfficiency, "",
+            "torque and electrical power are impossible: the shaft gives {} times the power that the motor takes; "
+            "check "
+            "speed (pole count), torque and current"},
+       }}) {
+    if (law.share > kRoom * law.largest)
+      broken.push_back(fmt::format(fmt::runtime(law.too_large), two_digits(law.share)));
+    if (law.share < law.least / kRoom)
+      broken.push_back(fmt::format(fmt::runtime(law.too_small), two_digits(100 * law.share)));
+  }
   return broken;
 }
 
