@@ -257,6 +257,12 @@ ExitCode run_table_line(const FitRequest& request, const FitInput& input, const 
   return ExitCode::data_rejected;
 }
 
+ExitCode refused_or_ok(const FitRequest& request, const Fitted& fitted) {
+  if (fitted.analysis.flight.readiness() != Readiness::not_yet || request.accept) return ExitCode::ok;
+  fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
+  return ExitCode::data_rejected;
+}
+
 /// Of a log without occlusions: K_T with its budget and a report, but nothing to fly with.
 ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, const Fitted& fitted) {
   if (!request.out.empty())
@@ -266,7 +272,7 @@ ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, cons
   print_findings(request, input, fitted, {});
   fmt::print(stderr, "{}", caution_text(fitted.identification, fitted.analysis));
   if (!request.no_report) write_report(fitted, input, input.folder / "report.html");
-  return ExitCode::ok;
+  return refused_or_ok(request, fitted);
 }
 
 ExitCode run_fit(const FitRequest& request) {
@@ -309,9 +315,7 @@ ExitCode run_fit(const FitRequest& request) {
     written.push_back(folder / (apart + "report.html"));
   }
   record(input, folder, written);
-  const bool refused = fitted.analysis.flight.readiness() == Readiness::not_yet && !request.accept;
-  if (refused) fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
-  return refused ? ExitCode::data_rejected : ExitCode::ok;
+  return refused_or_ok(request, fitted);
 }
 
 /// An option that takes the name of one of `values`; `into` must outlive the command.

@@ -280,6 +280,18 @@ TEST_F(FitProgram, FliesTheTableWhereKOverPhiIsNoLine) {
   EXPECT_THAT(two.err, HasSubstr("names 2 files, but the vehicle has 4 rotors"));
 }
 
+TEST_F(FitProgram, RefusesALogWithoutOcclusionsWhoseThrustNoPowerMakes) {
+  const std::string folder = steps("5x3");
+  auto log = results::read_steps(folder + "/steps.csv");
+  std::erase_if(log, [](const auto& step) { return step.occlusion_deg != 0; });
+  for (auto& step : log) step.thrust_n *= 4;
+  results::write_steps(folder + "/steps.csv", log);
+  const Answer refused = kphi({"fit", folder, "--no-report"});
+  EXPECT_EQ(refused.code, 5);
+  EXPECT_THAT(refused.out, AllOf(HasSubstr("do not fly yet"), HasSubstr("an ideal disk of this diameter needs")));
+  EXPECT_EQ(kphi({"fit", folder, "--no-report", "--accept"}).code, 0);
+}
+
 TEST_F(FitProgram, FitsALogWithoutOcclusionsToKTAlone) {
   const std::string folder = steps("5x3");
   auto log = results::read_steps(folder + "/steps.csv");
