@@ -62,6 +62,20 @@ class DelayFloor {
   double bin_end_ = -1;
 };
 
+/// No sample is later than its arrival. The line is a mean of the least delayed records, so some of them arrived a few
+/// µs before it; one that is off by more carries a stamp of a clock that stepped, and is left as it is.
+void hold_before_arrivals(const LoadCellColumns& cell, std::vector<Nanoseconds>& times) {
+  constexpr Nanoseconds kLargestDeviation = 1'000'000;
+  Nanoseconds next = std::numeric_limits<Nanoseconds>::max();
+  auto datagram = cell.datagrams.rbegin();
+  for (std::size_t i = times.size(); i-- > 0;) {
+    while (std::next(datagram) != cell.datagrams.rend() && std::next(datagram)->end > i) ++datagram;
+    if (const Nanoseconds late = times[i] - datagram->arrival_ns; late > 0 && late < kLargestDeviation)
+      times[i] = datagram->arrival_ns;
+    next = times[i] = std::min(times[i], next - 1);
+  }
+}
+
 }  // namespace
 
 ClockMap::ClockMap(const LoadCellColumns& cell, double device_rate_hz, std::span<const StreamEvent> events)
@@ -123,24 +137,6 @@ std::size_t ClockMap::first_at(const ClockEpoch& epoch, Nanoseconds time, std::s
   counts = counts.first(std::min(reach + 1, counts.size()));
   return from + static_cast<std::size_t>(std::ranges::partition_point(counts, earlier) - counts.begin());
 }
-
-namespace {
-
-/// The line goes through the midst of the least delayed records: some of them arrived some µs before it. What is off by
-/// more has a stamp of a clock that stepped.
-void hold_before_arrivals(const LoadCellColumns& cell, std::vector<Nanoseconds>& times) {
-  constexpr Nanoseconds kMostOfALine = 1'000'000;
-  Nanoseconds next = std::numeric_limits<Nanoseconds>::max();
-  auto datagram = cell.datagrams.rbegin();
-  for (std::size_t i = times.size(); i-- > 0;) {
-    while (std::next(datagram) != cell.datagrams.rend() && std::next(datagram)->end > i) ++datagram;
-    if (const Nanoseconds late = times[i] - datagram->arrival_ns; late > 0 && late < kMostOfALine)
-      times[i] = datagram->arrival_ns;
-    next = times[i] = std::min(times[i], next - 1);
-  }
-}
-
-}  // namespace
 
 std::vector<Nanoseconds> sample_times(const RunRecording& run, const LoadCellColumns& cell) {
   std::vector<Nanoseconds> times;

@@ -93,7 +93,7 @@ void judge_among_all(RepetitionFigure& figure, std::vector<std::vector<RunShare>
                      double all, const RepetitionRule& rule) {
   const RunShare run = others[o][r];
   others[o].erase(others[o].begin() + static_cast<std::ptrdiff_t>(r));
-  const RunScatter beyond = scatter_between(others, Doubt::none);
+  const RunScatter beyond = scatter_between(others, Keep::likeliest);
   const auto whole = [&](const RunShare& one) {
     return one.variance + square(beyond.share) + square(beyond.zero_n * one.per_n);
   };

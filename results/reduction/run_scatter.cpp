@@ -118,8 +118,8 @@ double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
   return freedom;
 }
 
-RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Doubt doubt) {
-  const double share_is_worth = doubt == Doubt::usual ? 1 : 0, zero_is_worth = doubt == Doubt::usual ? 2 : 0;
+RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Keep keep) {
+  const double share_is_worth = keep == Keep::worthwhile ? 1 : 0, zero_is_worth = keep == Keep::worthwhile ? 2 : 0;
   const std::vector<Sample> samples = samples_of(occlusions);
   Fit best;
   double most = best.likelihood(samples);

@@ -23,11 +23,16 @@ struct RunScatter {
 
 /// Degrees of freedom of the scatter between runs, pooled over occlusions: runs less one for each.
 [[nodiscard]] double freedom_between(std::span<const std::vector<RunShare>> occlusions);
-/// usual: a component is 0 unless the likelihood asks for it; none: it is as large as is likeliest.
-enum class Doubt { usual, none };
+
+enum class Keep {
+  worthwhile,  ///< a component is 0 unless it makes the runs clearly likelier
+  likeliest,   ///< each is as large as is likeliest
+};
+
 /// Both by restricted maximum likelihood from k and offset of the runs about the means of their occlusion, pooled over
 /// occlusions. docs/science.md has the equations. 0 without repetitions.
-[[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Doubt doubt = Doubt::usual);
+[[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions,
+                                         Keep keep = Keep::worthwhile);
 /// How well runs that explain so much of their variance would tell a scatter of this size.
 [[nodiscard]] RunScatter scatter_expected(double share, double zero_n,
                                           std::span<const std::vector<RunShare>> occlusions);
