@@ -82,17 +82,9 @@ std::optional<FitInput> log_of(const std::string& path) {
   return input;
 }
 
-/// As `kphi fit` and `kphi report` do it, over `range`.
-Fitted fitted_log(const FitInput& input, const SpeedRange& range) {
-  Identification K_T = identify(input.steps, {.speed_range = range, .mounted_once = input.mounted_once});
-  Analysis analysis = analyse(K_T, analysis_options(input, K_T));
-  return {std::move(K_T), std::move(analysis)};
-}
-
 /// Two logs over the speeds that both have, since k of a real propeller rises with speed.
 Comparison compare_logs(const FitInput& a, const FitInput& b, const CompareRequest& request) {
-  const SpeedRange all = IdentificationOptions().speed_range;
-  Fitted of_a = fitted_log(a, all), of_b = fitted_log(b, all);
+  Fitted of_a = fitted_log(a), of_b = fitted_log(b);
   const Identification &one = of_a.identification, &other = of_b.identification;
   const SpeedRange common{std::max(one.speed_min_rad_s, other.speed_min_rad_s),
                           std::min(one.speed_max_rad_s, other.speed_max_rad_s)};
@@ -117,7 +109,7 @@ Comparison compare_logs(const FitInput& a, const FitInput& b, const CompareReque
 
 ComparedResult loaded(const std::optional<FitInput>& log, const std::string& path) {
   if (!log) return load_result(path);
-  return result_of_log(fitted_log(*log, IdentificationOptions().speed_range), log->provenance.origin, path);
+  return result_of_log(fitted_log(*log), log->provenance.origin, path);
 }
 
 ExitCode compare_truth(const CompareRequest& request) {

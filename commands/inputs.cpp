@@ -199,6 +199,12 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
   return options;
 }
 
+Fitted fitted_log(const FitInput& input, const SpeedRange& range) {
+  Identification K_T = identify(input.steps, {.speed_range = range, .mounted_once = input.mounted_once});
+  Analysis analysis = analyse(K_T, analysis_options(input, K_T));
+  return {std::move(K_T), std::move(analysis)};
+}
+
 fs::path coefficient_file_of(const std::string& path) {
   const fs::path file = fs::is_directory(path) ? fs::path(path) / "coefficients.yaml" : fs::path(path);
   if (!fs::exists(file))
@@ -211,9 +217,8 @@ FittedFolder fitted_again(const std::string& folder) {
   const bool alone = !input.steps.empty() &&
                      std::ranges::all_of(input.steps, [](const auto& step) { return step.occlusion_deg == 0; });
   if (alone && !fs::exists(fs::path(folder) / "coefficients.yaml")) {
-    Identification K_T = identify(input.steps, {.mounted_once = input.mounted_once});
-    Analysis analysis = analyse(K_T, analysis_options(input, K_T));
-    return {std::move(input), {std::move(K_T), std::move(analysis)}};
+    Fitted fitted = fitted_log(input);
+    return {std::move(input), std::move(fitted)};
   }
   const fs::path file = coefficient_file_of(folder);
   if (!input.table.empty())

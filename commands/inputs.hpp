@@ -43,6 +43,10 @@ struct FitInput {
 /// load cell's from a weighing of its bench beside it.
 [[nodiscard]] fit::AnalysisOptions analysis_options(const FitInput& input, const fit::Identification& identification);
 
+/// A log: steps without occlusion, as `kphi fit` fits them, over `range`.
+[[nodiscard]] fit::Fitted fitted_log(const FitInput& input,
+                                     const fit::SpeedRange& range = fit::IdentificationOptions().speed_range);
+
 /// A folder with steps and coefficients, fitted and judged again as its coefficients.yaml says.
 struct FittedFolder {
   FitInput input;
