@@ -1,4 +1,4 @@
-// Rows that average repetitions (means.csv), taken apart into runs as far as their columns tell how these scatter.
+// Rows that average repetitions (means.csv): the runs behind them, as their columns describe the scatter.
 #pragma once
 
 #include <optional>

@@ -132,7 +132,7 @@ class Account {
     const Estimate &before = of_speed_[chord.before], &after = of_speed_[chord.after];
     const Estimate& speed = before.value > after.value ? before : after;
     const std::string fewer = "fit the speeds of your flight alone (--speed-range-rpm)";
-    add("k against speed, as far as seen", speed.u, speed.freedom, fewer);
+    add("error of the trend of k with the speed", speed.u, speed.freedom, fewer);
     add("air density", evidence_.air_density_u.value_or(0), std::numeric_limits<double>::infinity(), "");
 
     ThrustError error{0, phi_deg, {}};
@@ -151,7 +151,7 @@ class Account {
     take("k against speed", speed.value, fewer);
     take("a run that stands out", stray(chord), "repeat it, or leave it out (--leave-out)");
     if (phi_deg < first_occlusion())
-      take("a plate at 0°?", evidence_.plate_at_zero, "look whether a plate was on at 0°, and repeat it without");
+      take("a plate left on at 0°", evidence_.plate_at_zero, "check it, and repeat the runs at 0° without a plate");
     const double factor = scatter.coverage();
     for (const BudgetRow& row : scatter.rows)
       error.parts.push_back({row.source, factor * row.contribution(), row.remedy});

@@ -61,7 +61,7 @@ TEST(LateComputer, IsNamedWhereItKeepsBackWhatTheMotorSays) {
   for (const auto& entry : results::read_journal(folder->journal()).entries)
     if (entry.event == "campaign_stopped") reason = entry.data.at("reason");
   EXPECT_TRUE(safely(reason.starts_with("this computer")))
-      << reason;  // its standstill, which this is about, is no excuse
+      << reason;  // no excuse for a late computer: that is what is tested
   const Account account = bench.account();
   fmt::print("{}\ncoasts {:.0f} ms after the computer became busy\n", reason, account.coasts_at() - busy_ms);
   EXPECT_TRUE(safely(account.coasts_at() - busy_ms < 1500));

@@ -150,7 +150,7 @@ inline BentCount count_bent(const StudyTruth& truth, unsigned campaigns) {
   return count;
 }
 
-/// k falls from K_T on: what lies between 0° and the first occlusion is no question.
+/// k falls along the line from K_T on, without a plateau before the first occlusion.
 inline StudyTruth without_kink() { return {.line = {.K_T = CampaignTruth().intercept}}; }
 
 /// Real propellers of 5 inch rise by 11 to 21 %.

@@ -38,7 +38,7 @@ TEST(ThousandCampaigns, AStraightTruthIsCalledBentInOneOfTwenty) {
 }
 
 // A share of 95 % has a deviation of 0.7 % in a thousand: 94 % less two of them. Many cover more than 97 %: part of ±
-// is what the tests of the model find by chance. One jump in a campaign is no bell curve.
+// is what the tests of the model find by chance. The error of one jump in a campaign is not normal.
 TEST(ThousandCampaigns, CoverOnEightStands) {
   for (const ScatteringStand& stand : scattering_stands()) {
     fmt::print("{:<28}", stand.name);

@@ -21,7 +21,7 @@ void expect_cheap(bool buffered) {
     EXPECT_EQ(pair->driver.lost, 0u);
     ratios.push_back(pair->ratio());
   }
-  if (ratios.empty()) GTEST_SKIP() << "this machine was too busy to send 200 000 records per second";
+  ASSERT_FALSE(ratios.empty()) << "in ten trials this computer did not send 200 000 records per second";
   EXPECT_LE(ratios.back(), 1.5) << "median of " << ratios.size() << " pairs: " << median(ratios);
 }
 
