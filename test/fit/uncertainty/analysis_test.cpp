@@ -48,6 +48,19 @@ TEST_F(StudyAnalysis, ABudgetHasEverySourceAndSaysWhatIsAssumed) {
   EXPECT_NEAR(shares, 1, 1e-12);
 }
 
+TEST_F(StudyAnalysis, AssumesTheUsualSizesWhereNobodyMeasured) {
+  const Budget K_T = analyse(found).coefficients[0];
+  const double two_degrees = 2 * kPi / 180;
+  for (const auto& [source, share] :
+       std::vector<std::pair<const char*, double>>{{"cell calibration", 0.006},
+                                                   {"cross-axis", 0.002},
+                                                   {"alignment", two_degrees * two_degrees / std::sqrt(2.0)},
+                                                   {"motor clock", 2 * 0.002}}) {
+    EXPECT_TRUE(row_of(K_T, source).assumed) << source;
+    EXPECT_NEAR(row_of(K_T, source).contribution() / K_T.value, share, 1e-12) << source;
+  }
+}
+
 TEST_F(StudyAnalysis, TheZerosOwnUncertaintyIsInEveryK) {
   for (results::StepMean& step : campaign.steps) step.zero_u_n = 0.05;
   const Analysis after = analyse(identify(campaign.steps), options);
