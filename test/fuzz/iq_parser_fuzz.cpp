@@ -44,8 +44,8 @@ void converse(std::span<const std::uint8_t> bytes, std::size_t chunk) {
 /// be saved.
 void disturb(std::span<const std::uint8_t> bytes, std::size_t chunk) {
   kphi::iq::Session session{kphi::iq::Settings{}};
-  kphi::iq::fake::Module module;
   kphi::Instant now{0};
+  kphi::iq::fake::Module module([&] { return now; });
   session.connect_anew(now);
   std::size_t at = 0;
   for (int turn = 0; turn < 400; ++turn) {

@@ -43,6 +43,7 @@ void Session::restart(Instant now) {
   state_ = State::connecting;
   failure_.clear();
   connecting_.begin(known_);
+  reset_watch_.begin();
   if (settings_.inspects) connecting_.skip();
   inquiries_.abandon();
   polling_.end();
@@ -159,7 +160,7 @@ void Session::take_results(std::span<const QueryResult> all, Instant now) {
 }
 
 void Session::take_restart(const QueryResult& result, Instant now) {
-  if (state_ != State::ready || settings_.inspects) return;
+  if (state_ == State::failed || settings_.inspects) return;
   if (inquiries_.sets(result.entry())) return reset_watch_.expect_new_time();
   const auto sign = reset_watch_.take(result);
   if (!sign) return;
@@ -211,7 +212,6 @@ void Session::continue_connecting(Instant now) {
   if (settings_.inspects) return;
   if (!known_) armed_ = true;
   known_ = identity();
-  reset_watch_.begin(identity());
   polling_.begin(identity(), connecting_.system_control_id(), now);
   note(EventKind::motor_connected, identity().summary(), now);
 }

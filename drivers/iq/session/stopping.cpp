@@ -14,7 +14,8 @@ constexpr int kFewestAttempts = 5;
 constexpr const Entry& kDriveMode = entry<"brushless_drive.drive_mode">;
 constexpr int kUnderVoltage = 1 << static_cast<int>(FaultBit::under_voltage);
 constexpr Duration kRampStep = std::chrono::milliseconds(20);
-constexpr double kFalling = 0.95;  ///< of the speed at the coast
+constexpr double kSlowestClock = 0.9, kUptimeSlack_s = 0.1;  // of a module's uptime
+constexpr double kFalling = 0.95;                            ///< of the speed at the coast
 
 std::string rpm(double rad_s) { return fmt::format("{:.0f} RPM", std::abs(rad_s) * 30 / std::numbers::pi); }
 
@@ -210,21 +211,23 @@ std::optional<DriveWatch::Lapse> DriveWatch::lapsed(Instant last_reply, Instant 
   return unheard > longest_ ? std::optional(Lapse{false, unheard}) : std::nullopt;
 }
 
-void ResetWatch::begin(const AuditRecord& identity) {
-  uptime_ = identity.value<"system_control.time">();
-  faults_ = static_cast<int>(identity.value<"power_safety.fault_ever">().value_or(0));
-}
-
 std::optional<std::string> ResetWatch::take(const QueryResult& result) {
   if (result.answers(entry<"system_control.time">) && std::isfinite(result.value())) {
-    const auto before = std::exchange(uptime_, result.value());
-    if (before && result.value() < *before) {
-      return fmt::format("its uptime went from {:.3f} s back to {:.3f} s", *before, result.value());
-    }
+    const auto before = std::exchange(uptime_, Uptime{result.value(), result.time + result.uncertainty});
+    if (!before) return std::nullopt;
+    if (result.value() < before->seconds)
+      return fmt::format("its uptime went from {:.3f} s back to {:.3f} s", before->seconds, result.value());
+    // One that restarts soon after it was switched on has counted further by the next look than by the last. Not one
+    // that repeats itself.
+    const double passed_s = to_seconds(result.time - result.uncertainty - before->latest);
+    if (result.value() > before->seconds &&
+        result.value() < before->seconds + kSlowestClock * passed_s - kUptimeSlack_s)
+      return fmt::format("its uptime went from {:.3f} s to {:.3f} s, where {:.3f} s have passed", before->seconds,
+                         result.value(), passed_s);
   }
   if (result.answers(entry<"power_safety.fault_ever">)) {
-    const int before = std::exchange(faults_, static_cast<int>(result.value()));
-    if ((faults_ & ~before & kUnderVoltage) != 0) return "it reports an under-voltage (fault bit 0)";
+    const int now = static_cast<int>(result.value()), before = std::exchange(faults_, now).value_or(now);
+    if ((now & ~before & kUnderVoltage) != 0) return "it reports an under-voltage (fault bit 0)";
   }
   return std::nullopt;
 }

@@ -167,19 +167,25 @@ class DriveWatch {
   std::optional<Instant> drives_at_;  ///< when it reported driving, asked after the last speed
 };
 
-/// Detects a restart: the module's uptime goes backwards, or fault_ever gains the under-voltage bit. A restart loses
+/// Detects a restart: the module's uptime goes backwards or lags behind the time that passed, or fault_ever gains the
+/// under-voltage bit. A restart loses
 /// every volatile setting, the communication timeout first of all.
 class ResetWatch {
  public:
-  void begin(const AuditRecord& identity);
+  /// A connection begins: what is read first is what is compared with.
+  void begin() noexcept { *this = {}; }
   /// One of the two entries is being set: accepts any next value.
   void expect_new_time() noexcept { uptime_.reset(); }
   /// The evidence of a restart; nullopt: no restart.
   [[nodiscard]] std::optional<std::string> take(const QueryResult& result);
 
  private:
-  std::optional<double> uptime_;  ///< seconds of the module
-  int faults_ = 0;                ///< bits that were there before
+  struct Uptime {
+    double seconds;  ///< of the module
+    Instant latest;  ///< it was read no later
+  };
+  std::optional<Uptime> uptime_;
+  std::optional<int> faults_;  ///< bits that were there before
 };
 
 }  // namespace kphi::iq

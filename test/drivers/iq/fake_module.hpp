@@ -90,7 +90,10 @@ class Module {
   int restarts = 0;
   bool turns_at_once = true;  ///< it has the commanded speed at once; else the test says how fast it turns
 
-  Module() {
+  using Clock = std::function<Duration()>;
+  /// `now`: of its uptime.
+  explicit Module(Clock now = [] { return Duration(std::chrono::steady_clock::now().time_since_epoch()); })
+      : now_(std::move(now)), uptime_since_(now_()) {
     values = {{{50, 0}, u8(5)},          {{50, 13}, f32(0)},      {{69, 0}, f32(12.5)},      {{69, 1}, f32(3.25)},
               {{50, 36}, f32(10)},       {{83, 0}, f32(55.25)},   {{77, 0}, f32(44.5)},      {{50, 41}, u32(65536)},
               {{52, 15}, f32(1)},        {{52, 18}, u8(2)},       {{52, 19}, u8(2)},         {{5, 16}, u32(0x00100020)},
@@ -105,9 +108,10 @@ class Module {
   /// As after a brown-out: what was set is lost, the uptime begins again.
   void restart() {
     const auto id_value = values[{5, 14}];
-    values = Module().values;
+    values = Module(now_).values;
     values[{5, 14}] = id_value;
     values[{5, 15}] = f32(0.25);
+    uptime_since_ = now_();
     ++restarts;
   }
 
@@ -160,7 +164,10 @@ class Module {
   }
 
   [[nodiscard]] Bytes frame_of_reply(const QueryResult& message) const {
-    return kphi::iq::fake::message(message.type, message.sub, 3, message.id, values.at({message.type, message.sub}));
+    const Bytes& value = values.at({message.type, message.sub});
+    const bool uptime = message.type == 5 && message.sub == 15;
+    return kphi::iq::fake::message(message.type, message.sub, 3, message.id,
+                                   uptime ? f32(to_f32(value) + to_seconds(now_() - uptime_since_)) : value);
   }
 
   void apply(const QueryResult& message, const Key& key) {
@@ -174,10 +181,13 @@ class Module {
       if (turns_at_once) values[{50, 13}] = message.data;
     } else if (values.count(key) != 0) {
       values[key] = message.data;
+      if (key == Key{5, 15}) uptime_since_ = now_();
     }
   }
 
   Bytes buffer_;
+  Clock now_;
+  Duration uptime_since_;  ///< when it had the uptime of `values`
 };
 
 }  // namespace kphi::iq::fake

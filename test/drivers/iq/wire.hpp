@@ -21,14 +21,14 @@ using State = Session::State;
 /// A session and a module joined in virtual time, with a wire that can be told to misbehave.
 class Wire {
  public:
-  explicit Wire(Settings settings = {}) : settings_(settings), session(settings) {}
+  explicit Wire(Settings settings = {}) : module([this] { return now; }), settings_(settings), session(settings) {}
 
+  Instant now{0};
   Module module;
   Duration latency = 2ms;                                    ///< request to reply
   std::function<void(Bytes& reply, Duration& delay)> spoil;  ///< may change or empty a reply
   std::function<void(Instant)> before_hearing;               ///< lets the module's values follow the time
   std::vector<std::pair<Instant, Bytes>> batches;            ///< all that the session sent
-  Instant now{0};
 
  private:
   Settings settings_;

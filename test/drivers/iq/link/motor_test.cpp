@@ -184,7 +184,7 @@ TEST(Motor, SaysWithinTwoSecondsThatNoModuleAnswers) {
 
 TEST(Motor, StretchesProtocolDeadlinesOnAFastBench) {
   const SteadyClock clock(20);
-  ModuleOnALine line;
+  ModuleOnALine line([&](Module& m) { m = Module([&] { return clock.now(); }); });
   Motor motor(line.device(), 115200, Settings{}, clock);
   EXPECT_EQ(line.with([](Module& m) { return fake::to_f32(m.values.at({52, 15})); }), 0.5f) << "its own seconds";
   std::array<MotorReading, 512> readings;

@@ -180,6 +180,28 @@ TEST(EveryRestart, IsNoticedNamedAndNeverFollowedByMotion) {
   }
 }
 
+// A loose contact as it is switched on: the uptime of the second start is above that of the first when it is read next.
+TEST(Restarts, SoonAfterTheFirstStartAreSeenByTheTimeThatPassed) {
+  for (const bool connecting : {true, false}) {
+    Wire wire;
+    wire.module.restart();
+    wire.session.connect(wire.now);
+    const auto asked_for_uptime = [&] {
+      return wire.module.count([](const auto& m) { return m.type == 5 && m.sub == 15; }) > 0;
+    };
+    while (connecting ? !asked_for_uptime() : wire.session.state() != State::ready) wire.run_for(1ms);
+    wire.run_for(10ms);
+    wire.module.mute = true;
+    wire.run_for(150ms);
+    wire.module.restart();
+    wire.module.values[{5, 15}] = fake::f32(0.27);
+    wire.module.mute = false;
+    ASSERT_TRUE(wire.run_to_state(State::failed, 500ms)) << connecting;
+    EXPECT_EQ(wire.session.take_events().back().kind, EventKind::motor_reset) << wire.session.failure();
+    EXPECT_THAT(wire.session.failure(), HasSubstr("have passed"));
+  }
+}
+
 TEST(Restarts, AreNotSeenInOtherFaultsNorInBitsOfBefore) {
   Wire wire;
   wire.module.values[{84, 1}] = fake::u8(0x01);
