@@ -69,7 +69,9 @@ void check_end_of_motion(const Evidence& evidence, const Reaches& reaches, Lines
   const Instant decided = evidence.killed() ? story.ended : story.last_good_tick + 10ms;
   const bool slept = story.woke && *story.woke - evidence.mixture.sleep->lasts <= decided + kHeard;
   const bool alone = evidence.killed() || slept || reaches.line_silenced(decided - kOwnTimeout, decided + kOwnTimeout);
-  const Duration limit = alone ? kOwnTimeout : kHeard;
+  // Its own timeout begins anew with what is ordered after a short sleep, whether it obeys or not.
+  const bool woke_in_time = slept && evidence.mixture.sleep->lasts < kOwnTimeout;
+  const Duration limit = (alone ? kOwnTimeout : kHeard) + (woke_in_time ? evidence.mixture.sleep->lasts : Duration{});
   if (since > decided + limit)
     wrong.push_back(
         fmt::format("motion: coasts {:.0f} ms after {}, {:.0f} ms are allowed", 1e3 * to_seconds(since - decided),
