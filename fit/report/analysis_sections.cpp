@@ -110,7 +110,9 @@ std::string test_section(const Analysis& analysis) {
       "Tests", table,
       "p is the probability of at least this statistic if the hypothesis is true; – : too few data. Among "
       "so many tests a single p below 0.05 is expected. The verdict at the top of the page judges all of the "
-      "model together (Holm, 5 %).");
+      "model together (Holm, 5 %). What all runs share no test finds: a gain of the load cell is in ± as its "
+      "calibration; a wrong number of poles, a wrong torque arm and plates that are all off alike are in no part of "
+      "it.");
 }
 
 std::string speed_section(const std::vector<SpeedDependence>& speed) {

@@ -24,6 +24,8 @@ constexpr double kNegligible = 0.001;
 
 /// A run that stands out by less moves the mean of three by less than 0.5 %, and the scatter in the ± has it.
 constexpr double kSmallStray = 0.015;
+/// Of k from the slowest to the fastest speed: half of that at either end, which the error of the thrust counts anyhow.
+constexpr double kSmallTrend = 0.02;
 
 /// A doubt for the case that its test falls.
 struct Suspicion {
@@ -51,7 +53,7 @@ std::optional<Suspicion> of_speed(const Identification& identification, const Mo
     const double p = of_both(one.lack_of_fit.p, one.trend.p);
     if (std::isnan(p) || one.levels.size() < 2) continue;
     ++count;
-    if (!(p < clearest.p) || std::abs(one.change.value) < kNegligible) continue;
+    if (!(p < clearest.p) || std::abs(one.change.value) < kSmallTrend) continue;
     clearest.p = p;
     const double change = one.change.value, slowest = one.levels.front().k / identification.table[i].k - 1;
     clearest.doubt.text = fmt::format(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/statistics.hpp"
 
@@ -67,14 +68,13 @@ struct Fit {
     for (const Sample& one : samples) sum -= one.freedom * std::log(variance(one)) + one.squares / variance(one);
     return sum;
   }
-  /// Degrees of freedom: twice the square of a variance over the variance of its estimate, the other one unknown.
+  /// Degrees of freedom: twice the square of a variance over the variance of its estimate. Each as if the other one was
+  /// known: what one takes from the other leaves their sum, which a budget makes of them, as certain.
   [[nodiscard]] RunScatter scatter() const {
-    const auto freedom = [&](double size, double own, double other_size, double other) {
-      const double left = other_size > 0 && other > 0 ? own - square(of_both) / other : own;
-      return size > 0 ? std::max(1.0, 2 * square(size) * left) : 0;
+    const auto freedom = [](double size, double information) {
+      return size > 0 ? std::max(1.0, 2 * square(size) * information) : 0;
     };
-    return {std::sqrt(share), freedom(share, of_share, zero, of_zero), std::sqrt(zero),
-            freedom(zero, of_zero, share, of_share)};
+    return {std::sqrt(share), freedom(share, of_share), std::sqrt(zero), freedom(zero, of_zero)};
   }
 };
 
@@ -119,23 +119,34 @@ double freedom_between(std::span<const std::vector<RunShare>> occlusions) {
 }
 
 RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Keep keep) {
-  const double share_is_worth = keep == Keep::worthwhile ? 1 : 0, zero_is_worth = keep == Keep::worthwhile ? 2 : 0;
   const std::vector<Sample> samples = samples_of(occlusions);
-  Fit best;
-  double most = best.likelihood(samples);
   const bool may_add = std::ranges::any_of(samples, [](const Sample& one) { return one.of_zero > 0; });
-  const auto offer = [&](bool share, bool zero) {
-    if (samples.empty() || (zero && !may_add)) return;
-    const Fit fit = fit_of(samples, share, zero);
-    const double likelihood = fit.likelihood(samples) - (share ? share_is_worth : 0) - (zero ? zero_is_worth : 0);
-    if (likelihood > most) best = fit, most = likelihood;
+  struct Model {
+    Fit fit;
+    double likelihood;  ///< twice the logarithm, less what its components cost
   };
-  offer(true, false);
-  offer(false, true);
-  offer(true, true);
-  best.inform(samples);
-  RunScatter scatter = best.scatter();
-  if (!(best.share > 0)) scatter.share_freedom = freedom_between(occlusions);
+  std::vector<Model> models;
+  for (const auto& [share, zero] : {std::pair{false, false}, {true, false}, {false, true}, {true, true}}) {
+    if ((zero && !may_add) || (share && samples.empty())) continue;
+    const Fit fit = fit_of(samples, share, zero);
+    models.push_back({fit, fit.likelihood(samples) - (keep == Keep::averaged ? 2.0 * (share + zero) : 0)});
+  }
+  const Model& best = *std::ranges::max_element(models, {}, &Model::likelihood);
+  Fit fit = best.fit;
+  if (keep == Keep::averaged) {
+    // None is chosen: each counts as much as it is likely (weights of Akaike).
+    fit = {};
+    double weights = 0;
+    for (const Model& model : models) weights += std::exp(0.5 * (model.likelihood - best.likelihood));
+    for (const Model& model : models) {
+      const double weight = std::exp(0.5 * (model.likelihood - best.likelihood)) / weights;
+      fit.share += weight * model.fit.share;
+      fit.zero += weight * model.fit.zero;
+    }
+  }
+  fit.inform(samples);
+  RunScatter scatter = fit.scatter();
+  if (!(fit.share > 0)) scatter.share_freedom = freedom_between(occlusions);
   return scatter;
 }
 

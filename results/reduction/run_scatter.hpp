@@ -25,14 +25,13 @@ struct RunScatter {
 [[nodiscard]] double freedom_between(std::span<const std::vector<RunShare>> occlusions);
 
 enum class Keep {
-  worthwhile,  ///< a component is 0 unless it makes the runs clearly likelier
-  likeliest,   ///< each is as large as is likeliest
+  averaged,   ///< with and without each component, averaged by how likely the runs are (weights of Akaike)
+  likeliest,  ///< each is as large as is likeliest
 };
 
 /// Both by restricted maximum likelihood from k and offset of the runs about the means of their occlusion, pooled over
 /// occlusions. docs/science.md has the equations. 0 without repetitions.
-[[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions,
-                                         Keep keep = Keep::worthwhile);
+[[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Keep keep = Keep::averaged);
 /// How well runs that explain so much of their variance would tell a scatter of this size.
 [[nodiscard]] RunScatter scatter_expected(double share, double zero_n,
                                           std::span<const std::vector<RunShare>> occlusions);

@@ -40,18 +40,23 @@ class SharedZero {
   /// `weight` of the step in the mean of the zero: ω² where T = k ω² is fitted.
   void add(const StepMean& step, double weight) { add(step.zero_u_n, step.window_begin_s, step.window_end_s, weight); }
   void add(double zero_u_n, double begin_s, double end_s, double weight);
-  /// Standard uncertainty, N: of the measured zeros, and of a zero that wanders between them by `movement_n`, where it
-  /// is taken as a line in time. A random walk tied at both ends, and a jump at any time, have the covariance min(s, t)
-  /// − s t between the shares s and t of that time: steps beside one of the zeros feel little of it. 0.28 of the
-  /// movement in a run of rising speeds; without times 1/√12, as of a rectangle (JCGM 100, 4.3.7).
+  /// Standard uncertainty, N: of the measured zeros at the mean time of the steps (the zero is a line in time, so its
+  /// variance is a parabola, and the mean over the steps has that of their mean time), and of a zero that wanders
+  /// between them by `movement_n`, where it is taken as a line in time. A random walk tied at both ends, and a jump at
+  /// any time, have the covariance min(s, t) − s t between the shares s and t of that time: steps beside one of the
+  /// zeros feel little of it. 0.28 of the movement in a run of rising speeds; without times 1/√12, as of a rectangle
+  /// (JCGM 100, 4.3.7).
   [[nodiscard]] double u_n(double movement_n) const;
 
  private:
   struct Part {
-    double begin_s, end_s, weight;
+    double middle_s, weight, u_n;
   };
+  [[nodiscard]] double measured_variance(double mean_s) const;
+
   std::vector<Part> parts_;
-  double measured_ = 0, weights_ = 0;
+  double weights_ = 0;
+  double begin_s_ = std::numeric_limits<double>::infinity(), end_s_ = -begin_s_;
 };
 
 }  // namespace kphi::results

@@ -1,6 +1,9 @@
 // Step means of a campaign as the bench would leave them, from a known truth and a seed.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <functional>
 #include <random>
 #include <utility>
 #include <vector>
@@ -51,6 +54,23 @@ struct CampaignTruth {
     }
   }
   return steps;
+}
+
+/// Largest error of the thrust that flies, over φ up to 270° and speeds up to 19,100 RPM, against the true k(φ, RPM).
+inline double true_error(const Fitted& fitted, const std::function<double(double phi_deg, double rpm)>& truth) {
+  const auto& [identification, analysis] = fitted;
+  const compensation::ThrustCurve curve = identification.curve();
+  double worst = 0;
+  for (double phi = 0; phi <= 270; phi += 2.5) {
+    const double flown = curve.thrust_coefficient().value() * curve.scaling_factor(from_degrees(phi));
+    for (const double rpm : {3000.0, 10000.0, 19100.0}) {
+      const double speed = from_rpm(rpm).value();
+      const double trend =
+          analysis.trend ? 1 + analysis.trend->per_rad_s.value * (speed - analysis.trend->reference_rad_s) : 1;
+      worst = std::max(worst, std::abs(truth(phi, rpm) / (flown * trend) - 1));
+    }
+  }
+  return worst;
 }
 
 inline Fitted analysed(Identification found) {

@@ -43,12 +43,17 @@ TEST(ThousandCampaigns, CoverOnEightStands) {
   for (const ScatteringStand& stand : scattering_stands()) {
     fmt::print("{:<28}", stand.name);
     for (const auto& [quantity, found] : scatter_study(stand, 1000)) {
-      fmt::print(" {} {:.1f} % {:.2f}", quantity, found.share(), found.u_over_scatter());
       EXPECT_GE(found.share(), 92.6) << stand.name << ", " << quantity;
+      if (quantity == "number of the verdict") {
+        fmt::print(" {} ({:.1f} %) holds in {:.1f} %", quantity, 100 * found.expanded / found.n, found.share());
+        EXPECT_GE(found.share(), 95) << stand.name;
+        continue;
+      }
+      fmt::print(" {} {:.1f} % {:.2f}", quantity, found.share(), found.u_over_scatter());
       if (stand.one_jump_n > 0) continue;
       EXPECT_LE(found.share(), 99.3) << stand.name << ", " << quantity;
       EXPECT_GE(found.u_over_scatter(), 0.90) << stand.name << ", " << quantity;
-      EXPECT_LE(found.u_over_scatter(), 1.20) << stand.name << ", " << quantity;
+      EXPECT_LE(found.u_over_scatter(), 1.16) << stand.name << ", " << quantity;
     }
     fmt::print("\n");
   }

@@ -112,8 +112,19 @@ inline std::map<std::string, Scatter> scatter_study(const ScatteringStand& stand
   options.bench = BenchUncertainty::none();
   options.prediction_deg = {135};
   for (unsigned seed = 1; seed <= campaigns; ++seed) {
-    const Identification found = identify(scattering_campaign(stand, seed));
-    const Analysis analysis = analyse(found, options);
+    const Fitted fitted = [&] {
+      Identification identification = identify(scattering_campaign(stand, seed));
+      Analysis result = analyse(identification, options);
+      return Fitted{std::move(identification), std::move(result)};
+    }();
+    const auto& [found, analysis] = fitted;
+    Scatter& number = table["number of the verdict"];
+    const double error = true_error(fitted, [&](double phi, double) {
+      return std::min(truth.k(0), truth.k(phi)) * stand.thrust;  // no occlusion lifts k above K_T
+    });
+    ++number.n;
+    number.within += error <= analysis.flight.error.share ? 1 : 0;
+    number.expanded += analysis.flight.error.share;
     for (std::size_t i = 0; i < found.table.size(); ++i)
       table[analysis.coefficients[i].quantity].add(analysis.coefficients[i],
                                                    truth.k(found.table[i].phi_deg) * stand.thrust);

@@ -287,7 +287,7 @@ TEST(AnalysisSections, ShowTestsWithTheirP_AndLeaveTheVerdictToTheTopOfThePage) 
   found.curvature.lack_of_fit = {"line <bent>", "k is a line", "F", 99, 2, 10, 1e-7};
   const std::string html = analysis_appendix(found);
   (void)parsed("<div>" + html + "</div>");
-  expect_words(html, {"line &lt;bent&gt;", "&lt; 0.0001"});
+  expect_words(html, {"line &lt;bent&gt;", "&lt; 0.0001", "a gain of the load cell is in ± as its calibration"});
   EXPECT_THAT(html, Not(HasSubstr("rejected")));
 }
 

@@ -41,6 +41,8 @@ std::function<void(StepMean&)> exchanged(double a, double b) {
   };
 }
 
+double shaft_power_w(const StepMean& step) { return std::abs(step.torque_nm) * step.speed_rad_s; }
+
 /// As if the plate `on` was there instead of that of `named`; in one repetition or (0) in all.
 std::function<void(StepMean&)> instead(double named, double on, int repetition = 0) {
   const StudyTruth truth = without_kink();
@@ -90,9 +92,39 @@ const std::vector<Mistake>& mistakes() {
        },
        {"repetition 3 at 0° is", "k falls with speed", "k rises with speed"}},
       {"no zero was taken", [](StepMean& step) { step.thrust_n += 0.5; }, {"k falls with speed"}},
+      {"a current shunt of a tenth",
+       [](StepMean& step) {
+         step.supply_voltage_v = 12;
+         step.supply_current_a = 0.1 * shaft_power_w(step) / 12 / 0.7;
+       },
+       kUnit},
+      {"one run of a cell with another calibration",
+       [](StepMean& step) {
+         if (step.occlusion_deg == 90 && step.repetition == 2) step.thrust_n *= 1.05;
+       },
+       {"repetition 2 at 90° is"}},
+      {"the runs of one occlusion from another propeller",
+       [](StepMean& step) {
+         if (step.occlusion_deg == 180) step.thrust_n *= 1.6;
+       },
+       kPlate},
+      {"one run with seven for six pole pairs",
+       [](StepMean& step) {
+         if (step.occlusion_deg != 0 || step.repetition != 1) return;
+         step.speed_rad_s *= 7.0 / 6;
+         step.commanded_speed_rad_s *= 7.0 / 6;
+       },
+       {"repetition 1 at 0° is"}},
+      {"the propeller of one run turns the other way",
+       [](StepMean& step) {
+         if (step.occlusion_deg != 45 || step.repetition != 3) return;
+         step.thrust_n *= -0.5;
+       },
+       {"repetition 3 at 45° is", "must be positive", "reversed"}},
       // What no step can tell: the part of ± that holds it, if any, is named in the budget.
       {"a cell that reads 4 % too much", thrust_times(1.04), {}},
       {"twelve poles for fourteen", speed_times(7.0 / 6), {}},
+      {"a torque arm of 1.2 times", [](StepMean& step) { step.torque_nm *= 1.2; }, {}},
       {"all plates 5° too small",
        [](StepMean& step) {
          const StudyTruth truth = without_kink();
@@ -133,7 +165,8 @@ TEST(Sabotage, IsStoppedOrNamedWhereTheStepsCanTell) {
       std::ranges::for_each(campaign.steps, mistake.make);
       const std::vector<std::string> said = said_of(campaign);
       found += names(said, mistake) ? 1 : 0;
-      if (mistake.named_as.empty()) EXPECT_LE(said.size(), 1u) << mistake.name << ": " << said.front();
+      for (std::size_t i = mistake.named_as.empty() ? 1 : said.size(); i < said.size(); ++i)
+        ADD_FAILURE() << mistake.name << ": " << said[i];
     }
     if (mistake.named_as.empty()) continue;
     tellable += kEach;
@@ -146,11 +179,12 @@ TEST(Sabotage, IsStoppedOrNamedWhereTheStepsCanTell) {
 }
 
 TEST(Sabotage, IsNotSeenInCleanCampaigns) {
-  constexpr unsigned kCampaigns = 150;
+  constexpr unsigned kCampaigns = 1000;
   int named = 0;
   for (unsigned seed = 1; seed <= kCampaigns; ++seed)
     named += said_of(study_campaign(without_kink(), 1000 + seed)).empty() ? 0 : 1;
-  EXPECT_LE(named, 7) << "2 % of 150 are 3; more than 7 by chance once in 80";
+  std::printf("named %d of %u\n", named, kCampaigns);
+  EXPECT_LE(named, 20) << "2 %";
 }
 
 }  // namespace sabotage_test

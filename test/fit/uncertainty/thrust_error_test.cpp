@@ -11,24 +11,11 @@
 namespace kphi::fit {
 namespace thrust_error_test {
 
-/// Largest error of the thrust that flies, over all φ and speeds that the coefficients claim, against the truth.
+/// Of a stand of the study; k of the study jumps above K_T at first contact, which no occlusion does.
 double true_error(const StudyTruth& truth, double air, const Fitted& fitted) {
-  const auto& [identification, analysis] = fitted;
-  const compensation::ThrustCurve curve = identification.curve();
-  double worst = 0;
-  for (double phi = 0; phi <= 270; phi += 2.5) {
-    const double flown = curve.thrust_coefficient().value() * curve.scaling_factor(from_degrees(phi));
-    // k of the study jumps above K_T at first contact, which no occlusion does.
-    const double k = std::min(truth.k(0), truth.k(phi)) * air;
-    for (const double rpm : {3000.0, 10000.0, 19100.0}) {
-      const double speed = from_rpm(rpm).value();
-      const double trend =
-          analysis.trend ? 1 + analysis.trend->per_rad_s.value * (speed - analysis.trend->reference_rad_s) : 1;
-      const double held = k * (1 + truth.rise * (rpm / 19100 - 0.5));
-      worst = std::max(worst, std::abs(held / (flown * trend) - 1));
-    }
-  }
-  return worst;
+  return kphi::fit::true_error(fitted, [&](double phi, double rpm) {
+    return std::min(truth.k(0), truth.k(phi)) * air * (1 + truth.rise * (rpm / 19100 - 0.5));
+  });
 }
 
 struct Told {

@@ -53,6 +53,26 @@ TEST(SharedZero, OfAWalkIsAsUncertainAsTheWalkMakesIt) {
   EXPECT_NEAR(middle.said, middle.found, 0.05 * middle.found);
 }
 
+TEST(SharedZero, OfTwoNoisyZerosIsAsUncertainAsTheLineThroughThem) {
+  constexpr double kBefore = 0.01, kAfter = 0.02;
+  const std::vector<std::function<double(int step)>> weights{[](int) { return 1.0; }, [](int i) { return i * i; },
+                                                             [](int i) { return i < 10   ? 0.2
+                                                                                : i > 30 ? -0.04
+                                                                                         : 0; }};
+  for (const auto& weight : weights) {
+    SharedZero zero;
+    double before = 0, after = 0, sum = 0;
+    for (int i = 0; i < 40; ++i) {
+      const double share = (i + 2.5) / 45;  // the zeros are further away than the steps
+      zero.add(std::hypot(kBefore * (1 - share), kAfter * share), i, i + 1, weight(i));
+      before += weight(i) * (1 - share);
+      after += weight(i) * share;
+      sum += weight(i);
+    }
+    EXPECT_NEAR(zero.u_n(0), std::hypot(kBefore * before, kAfter * after) / sum, 1e-12);
+  }
+}
+
 TEST(SharedZero, WithoutTimesIsThatOfARectangleAndAddsWhatWasMeasured) {
   SharedZero zero;
   for (int i = 0; i < 10; ++i) zero.add(0.003, 0, 0, 1);
