@@ -243,7 +243,9 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
   command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
   command.add_option("--phi-deg", request.options.phi_deg,
                      "occlusion for targets with one constant per motor (default 0)");
-  command.add_option("--speed-max-rpm", request.options.speed_max_rpm, "speed at full output (default: the file's)")
+  command
+      .add_option("--speed-max-rpm", request.options.speed_max_rpm,
+                  "speed at full output (default: the vehicle's, else the file's)")
       ->check(CLI::PositiveNumber);
   command.add_option("--motors", request.options.motors, "number of motors for px4 and gazebo (default 4)")
       ->check(CLI::Range(1, 12));

@@ -238,6 +238,13 @@ TEST_F(Px4, LeavesTheMotorsBeforeItsOwnAlone) {
   EXPECT_NEAR(outputs[0], 0.7F, 1e-5);
   EXPECT_NEAR(outputs[1], 0.7F, 1e-5);
   expect_near(wrench_of(outputs, kO, 2), own_wrench(kDemands[1]));
+
+  const float less_folded[4] = {kPi - 0.2F, kPi - 0.2F, kPi - 0.4F, kPi - 0.2F};
+  arms(less_folded);  // and PX4 does not ask for a matrix yet: each thrust is corrected, and only those
+  const Outputs meanwhile = allocator.run(demand, now += 0.004);
+  EXPECT_EQ(meanwhile[0], outputs[0]);
+  EXPECT_EQ(meanwhile[1], outputs[1]);
+  EXPECT_NEAR(wrench_of(meanwhile, less_folded, 2)[0], own_wrench(kDemands[1])[0], 1e-4);
 }
 
 TEST_F(Px4, RefusesAVehicleThatCannotFlyAndGivesNoMatrix) {
@@ -249,6 +256,68 @@ TEST_F(Px4, RefusesAVehicleThatCannotFlyAndGivesNoMatrix) {
   EXPECT_NE(std::string(child.build(of)).find("spins"), std::string::npos);
   ActuatorEffectiveness::Configuration fresh;
   EXPECT_FALSE(child.getEffectivenessMatrix(fresh, EffectivenessUpdateReason::CONFIGURATION_UPDATE));
+}
+
+/// As PX4 holds them after `kphi export --to px4 --vehicle` (test/fit/export/flown_test.cpp flies that).
+std::map<std::string, float> parameters;
+
+void set_parameters() {
+  parameters = {{"CA_ROTOR_COUNT", 4},    {"KPHI_HALF_SIDE", 0.045F}, {"KPHI_ARM", 0.117F},
+                {"KPHI_PROP_R", 0.0635F}, {"KPHI_ARM_MIN", -90},      {"KPHI_ARM_MAX", 180},
+                {"KPHI_ARM_STALE", 2},    {"KPHI_M_BODY", 0.42F},     {"KPHI_M_X", 0},
+                {"KPHI_M_Y", 0},          {"KPHI_M_HUB", 0.045F},     {"KPHI_C_N", 0},
+                {"KPHI_W_MAX", kFastest}, {"KPHI_PHI_MAX", 270},      {"KPHI_OVERLAP", 0},
+                {"KPHI_LINE_K", 1.03F},   {"KPHI_LINE_S", -0.0029F},  {"KPHI_K_N", 0},
+                {"KPHI_TQ_N", 0},         {"KPHI_TREND", 0},          {"KPHI_TREND_W", 0}};
+  for (int i = 0; i < 4; ++i) {
+    const std::string number = std::to_string(i);
+    parameters["CA_ROTOR" + number + "_CT"] = kFull;
+    parameters["CA_ROTOR" + number + "_KM"] = i % 2 == 0 ? -kDrag : kDrag;
+    parameters["KPHI_REF" + number] = 45;
+    parameters["KPHI_H" + number + "_TURN"] = 90.0F * static_cast<float>(i);
+    parameters["KPHI_H" + number + "_MIRR"] = 0;
+  }
+}
+float parameter(const char* name) {
+  const auto found = parameters.find(name);
+  return found == parameters.end() ? kNaN : found->second;
+}
+std::string refusal() {
+  static MorphingVehicle made;
+  const char* refused = read_morphing_vehicle(parameter, made);
+  if (refused != nullptr) return refused;
+  ActuatorEffectivenessMorphing child;
+  const char* why = child.build(made);
+  return why != nullptr ? why : "";
+}
+
+TEST(Px4Parameters, AreNamedWhereOneIsMissingOrMakesNoSense) {
+  set_parameters();
+  EXPECT_EQ(refusal(), "");
+  const auto all = parameters;
+  for (const auto& [name, value] : all) {
+    parameters.erase(name);
+    EXPECT_EQ(refusal(), name) << "missing";
+    parameters = all;
+  }
+  for (const auto& [name, value] : {std::pair<const char*, float>{"KPHI_C_N", 13},
+                                    {"KPHI_K_N", -1},
+                                    {"KPHI_OVERLAP", 3},
+                                    {"CA_ROTOR_COUNT", 9},
+                                    {"CA_ROTOR2_KM", 0},
+                                    {"CA_ROTOR1_CT", 2 * kFull},
+                                    {"KPHI_ARM", 0},
+                                    {"KPHI_M_BODY", kNaN}}) {
+    parameters = all;
+    parameters[name] = value;
+    EXPECT_EQ(refusal(), name) << value;
+  }
+  parameters = all;
+  parameters["KPHI_PROP_R"] = 0.2F;
+  EXPECT_NE(refusal().find("arm"), std::string::npos);
+  parameters = all;
+  parameters["KPHI_LINE_K"] = -1;
+  EXPECT_NE(refusal(), "");
 }
 
 }  // namespace px4_test

@@ -178,7 +178,7 @@ TEST(ExportFlown, ToCAsTheLibraryInDoubleAndInFloat) {
                   1e-12);
     expect_speeds(
         compiled_and_run(std::string(kStrict) + "-DKPHI_FLOAT", "flight.c", flight, "k.h", text, KPHI_FLOAT_LIBRARY),
-        file, vehicle, 2e-6);
+        file, vehicle, 1e-6);
   });
   const auto square = vehicles().front();
   const auto file = coefficients(CurveForm::line, false);
@@ -245,7 +245,7 @@ TEST(ExportFlown, ToPx4ByTheMorphingChild) {
   for_all(true, [](const compensation::Coefficients& file, const profiles::Vehicle& vehicle) {
     expect_speeds(compiled_and_run(px4_compiler(), "flight.cpp", kFlightInPx4, "vehicle.params",
                                    to_px4(file, {.vehicle = &vehicle}).text, KPHI_FLOAT_LIBRARY),
-                  file, vehicle, 2e-6);
+                  file, vehicle, 1e-6);
   });
 }
 
