@@ -20,6 +20,7 @@
 #include "fit/propellers/history.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "fit/uncertainty/readiness.hpp"
+#include "profiles/vehicle.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/run_reader.hpp"
 
@@ -138,7 +139,7 @@ ExitCode run_compare(const CompareRequest& request) {
 }
 
 struct ExportRequest {
-  std::string file, to, out;
+  std::string file, to, out, vehicle;
   bool accept = false;
   ExportOptions options;
 };
@@ -171,9 +172,12 @@ void export_coefficients(const ExportRequest& request) {
   if (verdict && *verdict >= Readiness::not_yet && !request.accept)
     throw DataRejected(fmt::format("{}: {}; nothing is exported; --accept does it all the same", coefficients.path,
                                    verdict_words(coefficients)));
+  ExportOptions options = request.options;
+  std::optional<profiles::Vehicle> vehicle;
+  if (!request.vehicle.empty()) options.vehicle = &vehicle.emplace(profiles::load_vehicle(request.vehicle));
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
-    const Export result = target.write(coefficients, request.options);
+    const Export result = target.write(coefficients, options);
     if (request.out.empty()) std::fwrite(result.text.data(), 1, result.text.size(), stdout);
     if (!request.out.empty()) write_output(request.out, result.text);
     print_lost(result.lost);
@@ -220,7 +224,7 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
 void add_export(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<ExportRequest>(
       program, exit_code, "export", "write coefficients for a flight stack, or samples for a viewer",
-      "kphi export results/<folder> --to px4 --speed-max-rpm 19100\n"
+      "kphi export results/<folder> --to px4 --vehicle vehicle.yaml --out vehicle.params\n"
       "kphi export results/<folder>/runs/5x3_phi090_rep2.h5 --to mcap --out run.mcap",
       run_export);
   add_argument(command, "FILE", request.file, "coefficients.yaml, campaign folder, or a run (RUN.h5, to csv or mcap)")
@@ -233,10 +237,15 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
   }
   command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
+  add_value(command, "--vehicle", "FILE", request.vehicle,
+            "vehicle file, for targets that compute k from arm angles (c, px4, ros2; ardupilot needs it)")
+      ->check(CLI::ExistingFile);
   command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
   command.add_option("--phi-deg", request.options.phi_deg,
                      "occlusion for targets with one constant per motor (default 0)");
-  command.add_option("--speed-max-rpm", request.options.speed_max_rpm, "speed at full output (default: the file's)")
+  command
+      .add_option("--speed-max-rpm", request.options.speed_max_rpm,
+                  "speed at full output (default: the vehicle's, else the file's)")
       ->check(CLI::PositiveNumber);
   command.add_option("--motors", request.options.motors, "number of motors for px4 and gazebo (default 4)")
       ->check(CLI::Range(1, 12));

@@ -7,6 +7,7 @@
 #include "commands/inputs.hpp"
 #include "commands/outputs.hpp"
 #include "compensation/compensator.hpp"
+#include "compensation/file/coefficient_file.hpp"
 #include "compensation/flight/reproduction.hpp"
 #include "compensation/flight/tables.hpp"
 #include "compensation/flight/verdict.hpp"
@@ -24,6 +25,7 @@ struct FlyRequest {
   std::vector<std::string> coefficients;
   std::string vehicle;
   std::string world;
+  std::string open = "X", folded = "O";
   std::string experiment;
   std::size_t draws = 0;
   std::uint64_t seed = 1;
@@ -39,8 +41,9 @@ struct Flown {
   NineFlights on_bench;  ///< as much lost as on the bench: γ = 1
   std::vector<Draw> draws;
   std::vector<CogSign> signs;
-  Findings findings;    ///< of the draws, or of the one set of circumstances
-  Judgement judgement;  ///< by them; only if all nine were flown
+  std::optional<BlindZone> blind;  ///< of a file that is fit to fly
+  Findings findings;               ///< of the draws, or of the one set of circumstances
+  Judgement judgement;             ///< by them; only if all nine were flown
 };
 
 void require_section(const profiles::Vehicle& file, bool is_given, const char* section) {
@@ -50,11 +53,11 @@ void require_section(const profiles::Vehicle& file, bool is_given, const char* s
                   file.path, section));
 }
 
-flight::Vehicle vehicle_of(const profiles::Vehicle& file) {
+flight::Vehicle vehicle_of(const profiles::Vehicle& file, const FlyRequest& request) {
   flight::Vehicle vehicle;
   vehicle.airframe = profiles::airframe_of(file);
   vehicle.build = *file.dynamics;
-  for (const auto& [name, angles] : {std::pair{"X", &vehicle.x}, std::pair{"O", &vehicle.o}}) {
+  for (const auto& [name, angles] : {std::pair{request.open, &vehicle.x}, std::pair{request.folded, &vehicle.o}}) {
     const auto shape = file.shapes.find(name);
     if (shape == file.shapes.end()) {
       throw ConfigurationError(file.path + ": the experiments need the shape " + name +
@@ -65,8 +68,15 @@ flight::Vehicle vehicle_of(const profiles::Vehicle& file) {
   return vehicle;
 }
 
-Truth world_of(const FlyRequest& request, const flight::Vehicle& vehicle) {
-  if (request.world.empty()) return assumed_world(vehicle);
+AssumedWorld assumed_of(const FlyRequest& request, const flight::Vehicle& vehicle,
+                        const compensation::Rotors<compensation::ThrustCurve>& curves) {
+  const auto propeller = compensation::load_coefficients(request.coefficients.front()).propeller;
+  return assumed_world(vehicle, {propeller.diameter_in, propeller.blades}, curves);
+}
+
+Truth world_of(const FlyRequest& request, const flight::Vehicle& vehicle,
+               const compensation::Rotors<compensation::ThrustCurve>& curves) {
+  if (request.world.empty()) return assumed_of(request, vehicle, curves).truth;
   const profiles::World world = profiles::load_world(request.world);
   Truth truth = world.truth;
   if (!world.drag) truth.drag = vehicle.build.air_drag_per_s;
@@ -78,7 +88,7 @@ Scene nominal_of(const FlyRequest& request) {
   const auto curves = load_curves_for(request.coefficients, file);
   require_section(file, file.dynamics.has_value(), "dynamics (mass_kg, hub_mass_kg, …)");
   require_section(file, file.control.has_value(), "control (the controller's gains)");
-  const flight::Vehicle vehicle = vehicle_of(file);
+  const flight::Vehicle vehicle = vehicle_of(file, request);
   const auto built = compensation::Compensator::build(curves, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
   if (!Pilot::build(vehicle, curves, *file.control)) {
@@ -86,7 +96,7 @@ Scene nominal_of(const FlyRequest& request) {
                              ": its rotors cannot make every torque in X and in O; check shapes_deg and "
                              "rotor_spins (two of them 1, two -1, neighbours unlike)");
   }
-  const Truth world = world_of(request, vehicle);
+  const Truth world = world_of(request, vehicle, curves);
   const double hover = kGravity * vehicle.build.mass_kg / 4;
   const auto& thrust_max = built.compensator->thrust_max();
   const double weakest = std::min_element(thrust_max.begin(), thrust_max.end())->value();
@@ -143,7 +153,7 @@ bool all_flown(const Flown& flown) {
 }
 
 Flown fly_requested(const FlyRequest& request) {
-  Flown flown{nominal_of(request), {}, {}, {}, {}, {}, {}};
+  Flown flown{nominal_of(request), {}, {}, {}, {}, {}, {}, {}};
   Scene on_bench = flown.nominal;
   on_bench.truth.gamma = 1;
   const Shadow shadow(flown.nominal.vehicle.airframe);
@@ -159,6 +169,8 @@ Flown fly_requested(const FlyRequest& request) {
   if (request.experiment.empty()) flown.signs = signs_of_cog(flown.nominal, shadow);
   flown.findings = findings_of(flown.draws.empty() ? std::vector<Draw>{{flown.nominal, flown.flights}} : flown.draws);
   flown.judgement = judgement_of(flown.findings);
+  if (all_flown(flown) && flown.judgement.fitness == Fitness::fit_to_fly)
+    flown.blind = blind_zone_of(flown.nominal, shadow);
   if (!request.out.empty()) write_out(request, flown, traces);
   return flown;
 }
@@ -167,6 +179,19 @@ std::array<double, 4> percent_off(const std::array<double, 4>& shares) {
   std::array<double, 4> off{};
   for (std::size_t i = 0; i < off.size(); ++i) off[i] = 100 * (shares[i] - 1);
   return off;
+}
+
+/// Where the K_T of the air comes from.
+std::string origin_of_k_t(const FlyRequest& request, const Scene& scene) {
+  if (!request.world.empty()) return request.world;
+  const AssumedWorld world = assumed_of(request, scene.vehicle, scene.curves);
+  const double published = to_newtons_per_rpm2(world.published);
+  if (world.as_in_file)
+    return fmt::format("the file's own: within {:g} % of the {:.2g} N/RPM^2 published for such a propeller",
+                       100 * kPublishedScatter, published);
+  return fmt::format(
+      "{:.2g} N/RPM^2, as published for such a propeller: the file's is off by {:+.0f} %; --world FILE tells another",
+      published, 100 * (scene.curves[0].thrust_coefficient().value() / world.published.value() - 1));
 }
 
 std::string circumstances(const FlyRequest& request, const Scene& scene) {
@@ -182,31 +207,39 @@ std::string circumstances(const FlyRequest& request, const Scene& scene) {
   const std::string off = fmt::format(
       "mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm", 100 * (truth.mass - 1),
       fmt::join(percent_off(truth.thrust), " "), 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
+  const std::string shapes =
+      request.open == "X" && request.folded == "O"
+          ? ""
+          : fmt::format("\nFlown for X: shape {}; for O: shape {}.", request.open, request.folded);
   const std::string wired =
       truth.wiring == Truth().wiring ? "" : "\nThe controller takes one arm's angle for another's (arm_wiring).";
   return fmt::format(
       "The controller flies with {}.\n"
       "The air, which it does not know: K_T {:.4e} N/(rad/s)^2 ({}), loss \"{}\", gamma = {:g} times as on\n"
       "the bench. The vehicle differs from its file by: {}. Seed {}.{}\n\n",
-      known, truth.thrust_coefficient.value(),
-      request.world.empty() ? "assumed for three blades of this radius; --world FILE tells another" : request.world,
-      name_of(truth.law), truth.gamma, off, request.seed, wired);
+      known, truth.thrust_coefficient.value(), origin_of_k_t(request, scene), name_of(truth.law), truth.gamma, off,
+      request.seed, shapes + wired);
 }
 
 std::vector<PaperCell> cells_of(const Flown& flown) {
   return paper_cells(flown.on_bench, flown.flights, flown.draws, flown.nominal.pilot.gains);
 }
 
+bool k_t_judged(const FlyRequest& request, const Scene& scene) {
+  return !request.world.empty() || !assumed_of(request, scene.vehicle, scene.curves).as_in_file;
+}
+
 void print_text(const FlyRequest& request, const Flown& flown) {
-  fmt::print("{}{}", circumstances(request, flown.nominal),
-             reproduction_table(cells_of(flown), flown.nominal.truth.gamma));
+  const std::vector<PaperCell> cells = cells_of(flown);
+  if (all_flown(flown)) fmt::print("{}", words_of(flown.judgement, flown.findings));
+  if (flown.blind) fmt::print("{}", words_of(*flown.blind, k_t_judged(request, flown.nominal)));
+  fmt::print("{}{}", circumstances(request, flown.nominal), reproduction_table(cells, flown.nominal.truth.gamma));
   if (!flown.signs.empty()) fmt::print("{}", cog_table(flown.signs));
   for (std::size_t i = 0; i < flown.flights.size(); ++i) {
     if (flown.flights[i].lost) fmt::print("{}: lost, more than 1 m from its reference\n", kExperiments[i].name);
   }
   if (!flown.draws.empty()) fmt::print("{}", findings_table(flown.findings));
-  fmt::print("{}", not_reproduced());
-  if (all_flown(flown)) fmt::print("\n{}", words_of(flown.judgement, flown.findings));
+  fmt::print("{}", not_reproduced(cells));
 }
 
 Json json_of(const Findings& found) {
@@ -228,13 +261,16 @@ Json json_of(const Findings& found) {
 
 Json json_of(const PaperCell& cell) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
-  Json json{{"row", cell.row},
-            {"what", cell.what},
-            {"paper", cell.paper},
-            {"gamma_1", number(cell.bench)},
-            {"world", number(cell.world)},
-            {"reproduced", name_of(cell.reproduced)},
-            {"draws", cell.draws}};
+  Json json{
+      {"row", cell.row},
+      {"what", cell.what},
+      {"paper", cell.paper},
+      {"gamma_1", number(cell.bench)},
+      {"world", number(cell.world)},
+      {"reproduced", name_of(cell.reproduced)},
+      {"reason",
+       cell.reproduced == Reproduced::not_reproduced ? Json(kReasons[static_cast<std::size_t>(cell.reason)]) : Json()},
+      {"draws", cell.draws}};
   if (cell.draws > 0) json["p10_p50_p90"] = {cell.spread.p10, cell.spread.p50, cell.spread.p90};
   return json;
 }
@@ -267,13 +303,22 @@ void print_flights(const FlyRequest& request, const Flown& flown) {
   if (!flown.draws.empty()) out["study"] = json_of(flown.findings);
   if (all_flown(flown)) {
     out["verdict"] = {{"fitness", name_of(flown.judgement.fitness)}, {"doubts", flown.judgement.doubts}};
+    if (flown.blind) {
+      const BlindZone& blind = *flown.blind;
+      out["verdict"]["blind"] = {
+          {"fall_share", {blind.least_fall, blind.most_fall}},
+          {"k_t_share", k_t_judged(request, flown.nominal) ? Json{blind.least_k_t, blind.most_k_t} : Json()}};
+    }
   }
   out["world"] = {{"file", request.world.empty() ? Json() : Json(request.world)},
                   {"k_t_n_per_rad2_s2", truth.thrust_coefficient.value()},
                   {"mass_share", truth.mass}};
   out["paper"] = Json::array();
-  for (const PaperCell& cell : cells_of(flown)) out["paper"].push_back(json_of(cell));
-  out["not_reproduced"] = kNotReproduced;
+  const std::vector<PaperCell> cells = cells_of(flown);
+  for (const PaperCell& cell : cells) out["paper"].push_back(json_of(cell));
+  out["not_reproduced"] = Json::array();
+  for (const Reason reason : reasons_of(cells))
+    out["not_reproduced"].push_back(kReasons[static_cast<std::size_t>(reason)]);
   print_json(out);
 }
 
@@ -296,9 +341,12 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
       "Without --draws: one set of circumstances. With --draws N: N more sets, drawn from the seed, and percentiles.\n"
       "The exit code is 5 where the verdict is that the coefficients are not fit to fly.");
   add_flight_files(command, request.coefficients, request.vehicle);
-  add_value(command, "--world", "FILE", request.world,
-            "the air and what the vehicle differs by, which the controller never reads (profiles/world_example.yaml; "
-            "default: K_T 1.7e-8 N/RPM² at 5 inches, no error)");
+  add_value(
+      command, "--world", "FILE", request.world,
+      "the air and what the vehicle differs by, which the controller never reads (profiles/world_example.yaml; "
+      "default: K_T of the file if it is within 30 % of what is published for such a propeller, else that; no error)");
+  add_value(command, "--open", "SHAPE", request.open, "shape of the vehicle file to fly for X (default: X)");
+  add_value(command, "--folded", "SHAPE", request.folded, "shape to fly for O, such as H or T (default: O)");
   std::vector<std::string> names;
   for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
   add_value(command, "--experiment", "NAME", request.experiment,

@@ -47,6 +47,8 @@ World parse_world(const std::string& text, const std::string& path) {
   truth.arms = {file.get_or("/servo_lag_s", 0.0), from_degrees(file.get_or("/servo_backlash_deg", 0.0)).value(),
                 file.get_or("/arm_feedback_delay_s", 0.0)};
   truth.estimate_delay_s = file.get_or("/estimate_delay_s", 0.0);
+  truth.gyro_delay_s = file.get_or("/gyro_delay_s", 0.0);
+  truth.motor_noise = file.get_or("/motor_noise_share", 0.0);
   truth.wiring = read_wiring(file);
   world.drag = file.has("/air_drag_per_s");
   truth.drag = file.get_or("/air_drag_per_s", 0.0);

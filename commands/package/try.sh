@@ -47,13 +47,15 @@ kphi fit "$(cat folder)"
 kphi list
 grep -c '<svg' "$(cat folder)/report.html"
 kphi init vehicle
-kphi fly --coefficients "$(cat folder)/coefficients.yaml" --vehicle vehicle.yaml | tail -3
+kphi fly --coefficients "$(cat folder)/coefficients.yaml" --vehicle vehicle.yaml | head -2
 FIRST
 inside 'su - stranger -c "sh first.sh"'
 inside 'DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /packages/libkphi-compensation-dev_*.deb g++ pkg-config >/dev/null
   printf "#include \"compensation/compensator.hpp\"\nint main() { return kphi::compensation::doubts_about(*kphi::compensation::ThrustCurve::from_line(kphi::ThrustCoefficient(1e-6), kphi::ThrustCoefficient(1e-6), -1e-7, kphi::Radians(4)), {}).gains_with_occlusion; }\n" >/tmp/t.cpp
   g++ -std=c++17 /tmp/t.cpp $(pkg-config --cflags --libs kphi_compensation) -o /tmp/t && /tmp/t && echo "library linked"'
-inside 'apt-get purge -y -q kphi libkphi-compensation-dev >/dev/null'
+inside 'DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /packages/python3-kphi-compensation_*.deb >/dev/null
+  python3 -c "import kphi_compensation as kphi; print(kphi.ThrustCurve.from_line(1e-6, 1e-6, -1e-7, 4), \"in Python\")"'
+inside 'apt-get purge -y -q kphi libkphi-compensation-dev python3-kphi-compensation >/dev/null'
 after=$(listing)
 [ "$before" = "$after" ] || { echo "left after the purge:"; echo "$after"; exit 1; }
 echo "purged: nothing left"

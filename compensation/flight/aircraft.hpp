@@ -28,8 +28,13 @@ struct Truth {
   Eigen::Vector3d wind{0, 0, 0};               ///< m/s
   ArmHardware arms{};
   double estimate_delay_s = 0;              ///< age of the position and velocity that the controller is told
+  double gyro_delay_s = 0;                  ///< age of the body rates that it is told, at most kLongestGyroDelay
+  double motor_noise = 0;                   ///< deviation of a rotor's speed from what it is told, as a share of it
   std::array<int, 4> wiring{{0, 1, 2, 3}};  ///< which arm's angle the controller takes for arm i's
 };
+
+inline constexpr double kLongestGyroDelay = 0.05;  // s
+inline constexpr double kMotorNoiseMemory = 0.02;  // s: how long a motor's deviation lasts
 
 /// Position and velocity of the centre of gravity [m, m/s], attitude quaternion (w, x, y, z) body to world, angular
 /// momentum about the centre of gravity in the body frame [N m s], rotor speeds [rad/s].

@@ -9,6 +9,8 @@ namespace kphi::flight {
 namespace {
 
 constexpr double kLostMetres = 1.0;
+constexpr std::uint64_t kMotorStream = 101;  // of a scene's seed, besides those of its nine flights
+static_assert(kLongestGyroDelay / kStep < 31);
 
 /// Sums over the part of a leg that counts.
 class LegSums {
@@ -62,6 +64,9 @@ struct Flight {
   Angles told_ = arms_.hubs();                        ///< what the controller was told of the arms
   Eigen::Vector4d speeds_ = Eigen::Vector4d::Zero();  ///< what it asked for [rad/s]
   std::array<BodyMotion, 32> estimates_{};            ///< a ring, for the delay
+  std::array<Eigen::Vector3d, 32> rates_{};           ///< a ring, for the delay of the gyro
+  Random motors_{scene_.seed, kMotorStream};
+  Eigen::Vector4d deviation_ = Eigen::Vector4d::Zero();  ///< of the rotors' speeds, as a share
   long step_ = 0;
   std::size_t leg_ = 0;
 
@@ -127,11 +132,27 @@ struct Flight {
     if (trace_ != nullptr) trace_->push_back(row(truth));
   }
 
+  /// As old as the gyro is.
+  [[nodiscard]] Eigen::Vector3d rates_told() noexcept {
+    const auto step = static_cast<std::size_t>(step_);
+    const auto late = std::min(static_cast<std::size_t>(std::lround(scene_.truth.gyro_delay_s / kStep)),
+                               std::min(step, rates_.size() - 1));
+    rates_[step % rates_.size()] = body_rates(state_, now_.mass);
+    return rates_[(step - late) % rates_.size()];
+  }
+  /// What the motors make of what they are told: a deviation that wanders.
+  [[nodiscard]] Eigen::Vector4d as_driven(const Eigen::Vector4d& told) noexcept {
+    if (!(scene_.truth.motor_noise > 0)) return told;
+    const double keep = std::exp(-kStep / kMotorNoiseMemory), fresh = std::sqrt(1 - keep * keep);
+    for (double& one : deviation_) one = keep * one + motors_.normal(0, fresh * scene_.truth.motor_noise);
+    return told.cwiseProduct(Eigen::Vector4d::Ones() + deviation_).cwiseMax(0);
+  }
+
   void advance() noexcept {
     const Angles told = arms_.tell();
     for (std::size_t i = 0; i < told.size(); ++i) told_[i] = told[static_cast<std::size_t>(scene_.truth.wiring[i])];
     pilot_.set_arms(told_);
-    speeds_ = pilot_.act(body_rates(state_, now_.mass));
+    speeds_ = as_driven(pilot_.act(rates_told()));
     if (!arms_.moving()) {
       arms_.advance(seconds() + kStep);
       state_ = plant_.step(state_, kStep, {&now_, &now_, &now_}, speeds_);

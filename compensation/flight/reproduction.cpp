@@ -1,5 +1,6 @@
 #include "compensation/flight/reproduction.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -18,6 +19,7 @@ struct Asked {
   std::size_t leg;
   Of of;
   bool is_error;  ///< smaller is better
+  Reason reason;  ///< why it may not come out
 };
 
 void ask_hover(std::vector<Asked>& all) {
@@ -26,7 +28,10 @@ void ask_hover(std::vector<Asked>& all) {
     const std::string name = "Table I   " + std::string(row.start) + " -> " + std::string(row.final);
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
       all.push_back({name, kAxes[axis], row.paper[static_cast<std::size_t>(axis)], row.flight, row.leg,
-                     [axis](const LegResult& leg) { return std::fabs(leg.mean_error[axis]); }, row.final != "X"});
+                     [axis](const LegResult& leg) { return std::fabs(leg.mean_error[axis]); }, row.final != "X",
+                     row.final == "X" ? Reason::in_x
+                     : axis == 2      ? Reason::height
+                                      : Reason::sideways});
     }
   }
 }
@@ -35,13 +40,14 @@ void ask_height(std::vector<Asked>& all, const Gains& gains) {
   for (const HeightRow& row : kHeightRows) {
     const std::string name = "Table II  " + std::string(row.start) + " -> " + std::string(row.final);
     all.push_back({name, "e [m]", row.error, row.flight, row.leg,
-                   [](const LegResult& leg) { return leg.mean_error.z(); }, false});
+                   [](const LegResult& leg) { return leg.mean_error.z(); }, false,
+                   row.error < 0 ? Reason::sign_of_height : Reason::height});
     all.push_back({name, "e' [m/s]", row.error_rate, row.flight, row.leg,
-                   [](const LegResult& leg) { return leg.mean_error_rate.z(); }, false});
+                   [](const LegResult& leg) { return leg.mean_error_rate.z(); }, false, Reason::velocity_term});
     all.push_back(
         {name, "e'' [m/s2]", row.acceleration, row.flight, row.leg,
          [gains](const LegResult& leg) { return height_demand(gains, leg.mean_error.z(), leg.mean_error_rate.z()); },
-         false});
+         false, Reason::velocity_term});
   }
 }
 
@@ -53,11 +59,13 @@ void ask_forward(std::vector<Asked>& all) {
     } cells[] = {{"X", row.x}, {"O n.c.", row.o_plain}, {"O c.", row.o_compensated}};
     for (const auto& [name, cell] : cells) {
       if (!cell) continue;
+      const bool in_x = std::string(name) == "X";
       const std::string title = "Table III " + std::string(row.title) + ", " + name;
       all.push_back({title, "mean [m]", cell->mean, row.flight, cell->leg,
-                     [](const LegResult& leg) { return leg.mean_distance; }, std::string(name) != "X"});
+                     [](const LegResult& leg) { return leg.mean_distance; }, !in_x,
+                     in_x ? Reason::in_x : Reason::circles});
       all.push_back({title, "std. dev. [m]", cell->deviation, row.flight, cell->leg,
-                     [](const LegResult& leg) { return leg.deviation; }, false});
+                     [](const LegResult& leg) { return leg.deviation; }, false, in_x ? Reason::in_x : Reason::scatter});
     }
   }
 }
@@ -96,6 +104,7 @@ std::vector<PaperCell> paper_cells(const NineFlights& bench, const NineFlights& 
     cell.draws = values.size();
     cell.spread = percentiles(std::move(values));
     cell.reproduced = judged(cell, asked.is_error);
+    cell.reason = asked.reason;
     cells.push_back(std::move(cell));
   }
   return cells;
@@ -113,9 +122,36 @@ std::string reproduction_table(const std::vector<PaperCell>& cells, double gamma
     text += words("%-42s %-14s %9.4f", cell.row.c_str(), cell.what.c_str(), cell.paper) + " " + number(cell.bench) +
             " " + number(cell.world);
     if (drawn) text += words(" %9.4f%9.4f%9.4f", cell.spread.p10, cell.spread.p50, cell.spread.p90);
-    text += std::string("  ") + name_of(cell.reproduced) + "\n";
+    text += std::string("  ") + name_of(cell.reproduced);
+    if (cell.reproduced == Reproduced::not_reproduced) text += std::string(" (") + letter_of(cell.reason) + ")";
+    text += "\n";
   }
   return text + "\n";
+}
+
+std::vector<Reason> reasons_of(const std::vector<PaperCell>& cells) {
+  std::vector<Reason> reasons;
+  for (std::size_t i = 0; i < kReasons.size(); ++i) {
+    const auto reason = static_cast<Reason>(i);
+    const bool counts = std::any_of(cells.begin(), cells.end(), [&](const PaperCell& cell) {
+      return cell.reason == reason &&
+             (cell.reproduced == Reproduced::unknown || cell.reproduced == Reproduced::not_reproduced);
+    });
+    if (counts) reasons.push_back(reason);
+  }
+  return reasons;
+}
+
+std::string not_reproduced(const std::vector<PaperCell>& cells) {
+  const bool drawn = !cells.empty() && cells[0].draws > 0;
+  std::string text;
+  for (const Reason reason : reasons_of(cells))
+    text +=
+        std::string("(") + letter_of(reason) + ") " + std::string(kReasons[static_cast<std::size_t>(reason)]) + "\n";
+  if (text.empty()) return text;
+  return (drawn ? "Not reproduced:\n"
+                : "Not reproduced: --draws 300 tells which; a number that is not, for this reason:\n") +
+         text;
 }
 
 std::vector<CogSign> signs_of_cog(const Scene& nominal, const Shadow& shadow) {

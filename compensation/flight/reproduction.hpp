@@ -8,6 +8,7 @@
 
 #include "compensation/flight/pilot.hpp"
 #include "compensation/flight/study.hpp"
+#include "compensation/flight/tables.hpp"
 
 namespace kphi::flight {
 
@@ -23,6 +24,7 @@ struct PaperCell {
   std::size_t draws = 0;                        ///< in which this leg was flown to its end
   Percentiles spread{};                         ///< over them
   Reproduced reproduced = Reproduced::unknown;  ///< unknown without draws
+  Reason reason = Reason::in_x;                 ///< why not, where it is not
 };
 
 /// `within`: the paper's number lies between p10 and p90. Otherwise `not_reproduced`, unless it is an error in O and
@@ -39,6 +41,12 @@ struct PaperCell {
 }
 
 [[nodiscard]] std::string reproduction_table(const std::vector<PaperCell>& cells, double gamma);
+
+/// Of these cells, each once, in the order of kReasons: of those that are not reproduced, or, where nothing was drawn,
+/// of all.
+[[nodiscard]] std::vector<Reason> reasons_of(const std::vector<PaperCell>& cells);
+/// "Not reproduced:" and the reasons under the letters of the table; empty if there are none.
+[[nodiscard]] std::string not_reproduced(const std::vector<PaperCell>& cells);
 
 /// What a millimetre does: the ratios with the centre of gravity off by (±1, ±0.5) mm and not at all.
 struct CogSign {

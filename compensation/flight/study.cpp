@@ -58,12 +58,28 @@ void draw_gains(Gains& gains, Random& random) {
 
 }  // namespace
 
-Truth assumed_world(const Vehicle& vehicle) {
-  constexpr double kFiveInches = 0.0635;  // m, radius
-  Truth world;
-  world.thrust_coefficient =
-      world.thrust_coefficient * std::pow(vehicle.airframe.propeller_radius.value() / kFiveInches, 4);
-  world.drag = vehicle.build.air_drag_per_s;
+ThrustCoefficient published_thrust(const PropellerKind& kind) {
+  const bool two = kind.blades == 2, six = kind.diameter_in > 5.5;
+  const double of_size = six ? (two ? 2.6e-8 : 3.1e-8) : (two ? 1.3e-8 : 1.7e-8);
+  return from_newtons_per_rpm2(of_size * std::pow(kind.diameter_in / (six ? 6 : 5), 4));
+}
+
+AssumedWorld assumed_world(const Vehicle& vehicle, PropellerKind kind,
+                           const compensation::Rotors<compensation::ThrustCurve>& curves) {
+  constexpr double kInch = 0.0254;  // m
+  if (!(kind.diameter_in > 0)) kind.diameter_in = 2 * vehicle.airframe.propeller_radius.value() / kInch;
+  const double k_t = curves[0].thrust_coefficient().value();
+  const auto near = [&](int blades) {
+    const double published = published_thrust({kind.diameter_in, blades}).value();
+    return std::fabs(k_t / published - 1) <= kPublishedScatter;
+  };
+  AssumedWorld world;
+  world.published = published_thrust(kind);
+  world.as_in_file = kind.blades > 0 ? near(kind.blades) : near(2) || near(3);
+  world.truth.drag = vehicle.build.air_drag_per_s;
+  world.truth.thrust_coefficient = world.as_in_file ? curves[0].thrust_coefficient() : world.published;
+  for (std::size_t i = 0; world.as_in_file && i < curves.size(); ++i)
+    world.truth.thrust[i] *= curves[i].thrust_coefficient().value() / k_t;
   return world;
 }
 
@@ -155,12 +171,15 @@ Percentiles percentiles(std::vector<double> values) {
 
 Findings findings_of(const std::vector<Draw>& draws) {
   std::vector<Merits> kept;
+  std::vector<double> in_x;
   std::array<std::vector<double>, kLossLaws> hover_by_law, forward_by_law;
   Findings found;
   found.draws = draws.size();
   double hover_better = 0, forward_better = 0;
   for (const Draw& draw : draws) {
     const Merits merits = merits_of(draw.flights);
+    const FlightResult& hover = draw.flights[kHoverPlain];
+    if (hover.leg_count > 0 && !(hover.lost && hover.lost_leg == 0)) in_x.push_back(merits.hover_z_x);
     const bool saved = merits.lost_plain && !merits.lost_compensated;
     found.lost_plain += merits.lost_plain;
     found.lost_compensated += merits.lost_compensated;
@@ -173,6 +192,7 @@ Findings findings_of(const std::vector<Draw>& draws) {
     forward_by_law[law].push_back(merits.forward_ratio());
   }
   found.kept = kept.size();
+  if (!in_x.empty()) found.hover_z_x = percentiles(in_x).p50;
   for (std::size_t law = 0; law < found.by_law.size(); ++law) {
     found.by_law[law] = {hover_by_law[law].size(), percentiles(hover_by_law[law]).p50,
                          percentiles(forward_by_law[law]).p50};

@@ -4,15 +4,35 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "compensation/flight/flight.hpp"
 
 namespace kphi::flight {
 
-/// The world where nobody says another one: the errors of Truth{}, the vehicle's drag, and K_T of a three-bladed
-/// propeller of its size, 1.7e-8 N/RPM² at 5 inches, with the fourth power of its radius.
-[[nodiscard]] Truth assumed_world(const Vehicle& vehicle);
+/// A propeller as its coefficient file names it; 0: it does not say.
+struct PropellerKind {
+  double diameter_in = 0;
+  int blades = 0;
+};
+/// K_T of such a propeller as the paper tells of its four: 1.3e-8 and 1.7e-8 N/RPM² for two and three blades of 5
+/// inches, 2.6e-8 and 3.1e-8 of 6; between and beyond with the fourth power of the diameter. Three blades if it does
+/// not say.
+[[nodiscard]] ThrustCoefficient published_thrust(const PropellerKind& kind);
+/// What propellers of one size and number of blades differ by, as a share of that; measured ones of 5 inches reach from
+/// 1.1e-8 to 1.5e-8 N/RPM².
+inline constexpr double kPublishedScatter = 0.3;
+
+/// The world where nobody says another one: the errors of Truth{}, the vehicle's drag, and a K_T.
+struct AssumedWorld {
+  Truth truth;
+  ThrustCoefficient published;  ///< N/(rad/s)², for the file's propeller
+  bool as_in_file = false;      ///< the K_T of the file, which is within kPublishedScatter; else the published one
+};
+/// A size that the file does not say is that of the vehicle.
+[[nodiscard]] AssumedWorld assumed_world(const Vehicle& vehicle, PropellerKind kind,
+                                         const compensation::Rotors<compensation::ThrustCurve>& curves);
 
 /// The one set of circumstances that single flights use. `seed` is of the estimator's noise.
 [[nodiscard]] Scene nominal_scene(const Vehicle& vehicle, const PilotSettings& pilot,
@@ -103,6 +123,7 @@ struct Findings {
   std::size_t kept = 0;  ///< draws of which no flight was lost
   std::size_t lost_plain = 0;
   std::size_t lost_compensated = 0;
+  std::optional<double> hover_z_x;                   ///< m, median over all draws that hovered in X at all
   double hover_z_better = 0;                         ///< share of the draws, |z|
   double forward_better = 0;                         ///< share of the draws
   std::array<Percentiles, kMerits.size()> merits{};  ///< in the order of kMerits

@@ -114,12 +114,6 @@ std::string findings_table(const Findings& found) {
   return text + "\n";
 }
 
-std::string not_reproduced() {
-  std::string text = "Not reproduced:\n";
-  for (const std::string_view& what : kNotReproduced) text += "- " + std::string(what) + "\n";
-  return text;
-}
-
 std::string trace_csv(const std::vector<TraceRow>& trace) {
   Csv csv(
       "time_s,leg,reference_x_m,reference_y_m,reference_z_m,estimate_x_m,estimate_y_m,estimate_z_m,x_m,y_m,z_m,"

@@ -71,20 +71,31 @@ inline constexpr std::array<ForwardRow, 6> kForwardRows{{
     {"rising X - O c.", kRisingCompensated, ForwardCell{0, 0.0975, 0.0363}, {}, ForwardCell{1, 0.1038, 0.0439}},
 }};
 
-/// What the simulation does not show, whatever is drawn, and why.
-inline constexpr std::array<std::string_view, 4> kNotReproduced{{
+/// Why a number of the paper may not come out of the simulation. Every one of the tables has its reason.
+enum class Reason : std::uint8_t { in_x, velocity_term, sign_of_height, sideways, height, circles, scatter };
+inline constexpr std::array<std::string_view, 7> kReasons{{
     "the errors in X of Tables I and III: they come from the estimator, latency and trim of the real drone, which are "
     "not modelled and not tuned in",
-    "the velocity term of Table II (-0.505 m/s): e = z_ref - z_est makes it a climb at half a metre per second, which "
-    "no hover is; its identity kP e + kD e' holds as arithmetic",
+    "the velocity term of Table II (-0.505 m/s) and the acceleration with it: e = z_ref - z_est makes it a climb at "
+    "half "
+    "a metre per second, which no hover is; the identity kP e + kD e' holds as arithmetic",
     "the sign of the height in row 2 of Table II: the paper's compensated drone is above its reference, this one "
     "mostly below, because more is lost in flight than on the bench",
-    "x and y of Table I: they depend on the centre of gravity, the attitude stiffness and kpxy, none of them "
+    "x and y of Table I in O: they depend on the centre of gravity, the attitude stiffness and kpxy, none of them "
     "published; the draws show how much",
+    "the height in O: it is what is lost in flight, by one factor (gamma) and three laws for a propeller of the "
+    "paper's; "
+    "another propeller, vehicle or gain than the paper's has another",
+    "the mean distance on the circles in O: it holds the errors in X, too, which are smaller here",
+    "the scatter about that mean: of draughts, jumps of the estimator and trim of the real drone only a noise is "
+    "modelled",
 }};
+/// "a", "b", …: how a table refers to a reason.
+[[nodiscard]] inline char letter_of(Reason reason) noexcept {
+  return static_cast<char>('a' + static_cast<int>(reason));
+}
 
 [[nodiscard]] std::string findings_table(const Findings& findings);
-[[nodiscard]] std::string not_reproduced();
 
 /// ë = kP e + kD ė of the height [m/s²].
 [[nodiscard]] inline double height_demand(const Gains& gains, double error, double error_rate) noexcept {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include "compensation/flight/tables.hpp"
@@ -30,8 +31,9 @@ void doubt_losses(Judgement& judgement, const Findings& found) {
 }
 
 void doubt_thrust(Judgement& judgement, const Findings& found) {
-  const double off = merit(found, "hover_z_x_m").p50;
-  if (found.kept == 0 || std::fabs(off) <= kHoverInX) return;
+  // Of every draw that hovered in X, also of one that is lost later, in O without compensation.
+  const double off = found.hover_z_x.value_or(0);
+  if (std::fabs(off) <= kHoverInX) return;
   judgement.doubts.push_back(words(
       "hovers %.2f m %s its reference in X, where nothing is covered: K_T of the file is too %s, or the mass of the "
       "vehicle file too %s; weigh the vehicle, and measure K_T again",
@@ -76,14 +78,69 @@ Judgement judgement_of(const Findings& findings) {
   return judgement;
 }
 
+namespace {
+
+bool is_fit(const Scene& scene, const Shadow& shadow) {
+  return judgement_of(findings_of({{scene, fly_all(scene, shadow)}})).fitness == Fitness::fit_to_fly;
+}
+
+/// The last of `steps` before the first with which a file is no longer fit to fly; 1 if the first is not.
+template <std::size_t N, class With>
+double last_fit(const std::array<double, N>& steps, const Shadow& shadow, const With& with) {
+  double last = 1;
+  for (const double step : steps) {
+    const std::optional<Scene> scene = with(step);
+    if (!scene || !is_fit(*scene, shadow)) break;
+    last = step;
+  }
+  return last;
+}
+
+}  // namespace
+
+BlindZone blind_zone_of(const Scene& nominal, const Shadow& shadow) {
+  constexpr std::array<double, 6> kLess{0.9, 0.8, 0.7, 0.6, 0.5, 0.3}, kMore{1.1, 1.25, 1.5, 1.75, 2, 3};
+  constexpr std::array<double, 5> kSmaller{0.97, 0.95, 0.92, 0.9, 0.8}, kLarger{1.03, 1.05, 1.08, 1.1, 1.2};
+  const auto with_fall = [&](double steepness) -> std::optional<Scene> {
+    Scene scene = nominal;
+    for (compensation::ThrustCurve& curve : scene.curves) {
+      const auto changed = curve.perturbed(ThrustCoefficient(0), steepness);
+      if (!changed) return std::nullopt;
+      curve = *changed;
+    }
+    return scene;
+  };
+  const auto with_k_t = [&](double share) -> std::optional<Scene> {
+    Scene scene = nominal;
+    scene.truth.thrust_coefficient = scene.truth.thrust_coefficient / share;
+    return scene;
+  };
+  return {last_fit(kLess, shadow, with_fall), last_fit(kMore, shadow, with_fall), last_fit(kSmaller, shadow, with_k_t),
+          last_fit(kLarger, shadow, with_k_t)};
+}
+
+std::string words_of(const BlindZone& blind, bool k_t_judged) {
+  std::string text = words(
+      "it would say the same of a k(φ) that falls %g to %g times as much as the file's, in the one set of "
+      "circumstances "
+      "that every file gets\n",
+      blind.least_fall, blind.most_fall);
+  if (k_t_judged)
+    return text + words("and of a K_T that is %.0f %% too small to %.0f %% too large\n\n", 100 * (1 - blind.least_k_t),
+                        100 * (blind.most_k_t - 1));
+  return text +
+         "and of any K_T that such a propeller may have: the air has that of the file; --world FILE with a K_T from "
+         "elsewhere judges it\n\n";
+}
+
 std::string words_of(const Judgement& judgement, const Findings& findings) {
   if (judgement.fitness == Fitness::fit_to_fly) {
     if (findings.draws == 1) {
       return "verdict: fit to fly in this world, in the one set of circumstances flown; --draws 300 flies more of "
-             "them\n\n";
+             "them\n";
     }
     return "verdict: fit to fly in this world; the vehicle is lost " + in_draws(findings.lost_compensated, findings) +
-           " with compensation or in X, " + in_draws(findings.lost_plain, findings) + " in O without\n\n";
+           " with compensation or in X, " + in_draws(findings.lost_plain, findings) + " in O without\n";
   }
   std::string text = "verdict: NOT fit to fly in this world\n";
   for (const std::string& doubt : judgement.doubts) text += "- " + doubt + "\n";

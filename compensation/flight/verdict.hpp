@@ -27,6 +27,17 @@ inline constexpr double kSidewaysRatio = 1.15;   ///< horizontal error with comp
 /// Of many draws, or of one.
 [[nodiscard]] Judgement judgement_of(const Findings& findings);
 
+/// What a file may be wrong by and still be called fit to fly, in the circumstances of one scene: as far as was tried.
+struct BlindZone {
+  double least_fall = 1, most_fall = 1;  ///< what k(φ) loses over φ, as a share of what the file says
+  double least_k_t = 1, most_k_t = 1;    ///< K_T of the file over that of the air
+};
+/// Flies the nine experiments once for each step away from the file, until the verdict changes. Of a scene that is fit
+/// to fly.
+[[nodiscard]] BlindZone blind_zone_of(const Scene& nominal, const Shadow& shadow);
+/// One sentence. `k_t_judged`: the air has a K_T that is not the file's own.
+[[nodiscard]] std::string words_of(const BlindZone& blind, bool k_t_judged);
+
 /// "verdict: fit to fly …", or what speaks against it, a line each.
 [[nodiscard]] std::string words_of(const Judgement& judgement, const Findings& findings);
 [[nodiscard]] constexpr const char* name_of(Fitness fitness) noexcept {

@@ -9,6 +9,10 @@
 
 #include "compensation/file/coefficient_file.hpp"
 
+namespace kphi::profiles {
+struct Vehicle;
+}
+
 namespace kphi::fit {
 
 /// Seen from above.
@@ -21,7 +25,8 @@ struct ExportOptions {
   double phi_deg = 0;                     ///< for targets with one constant per motor
   std::optional<double> speed_max_rpm{};  ///< at full output; default: the highest speed of the file
   int motors = 4;
-  std::vector<Turn> turns{};  ///< of the motors, in their order; empty: not known
+  std::vector<Turn> turns{};                   ///< of the motors, in their order; empty: not known
+  const profiles::Vehicle* vehicle = nullptr;  ///< for targets that compute k from arm angles; outlives the call
 };
 
 struct Export {
@@ -34,13 +39,14 @@ struct Export {
 /// "fit to fly", …, "unknown".
 [[nodiscard]] std::string verdict_words(const compensation::Coefficients& file);
 
-/// Throws ConfigurationError for a φ outside the measured range, an unknown speed at full output, or turning directions
-/// of another number of motors.
+/// Throws ConfigurationError for a φ outside the measured range, an unknown speed at full output, turning directions of
+/// another number of motors, or a vehicle that is missing or cannot be flown.
 [[nodiscard]] Export to_agilicious(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_px4(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_ros2(const compensation::Coefficients& file, const ExportOptions& options);
-[[nodiscard]] Export to_header(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_ardupilot(const compensation::Coefficients& file, const ExportOptions& options);
+[[nodiscard]] Export to_c(const compensation::Coefficients& file, const ExportOptions& options);
 /// phi_deg, k and its u first: `kphi fit` reads the table.
 [[nodiscard]] Export to_csv(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_mcap(const compensation::Coefficients& file, const ExportOptions& options);

@@ -113,7 +113,7 @@ TEST_F(Campaigns, SayInEachOutputThatTheyAreSimulated) {
       {"export", coefficients, "--to", "px4", "--speed-max-rpm", "19000"},
       {"export", coefficients, "--to", "gazebo"},
       {"export", coefficients, "--to", "ros2"},
-      {"export", coefficients, "--to", "header"},
+      {"export", coefficients, "--to", "c"},
       {"export", coefficients, "--to", "csv"},
       {"export", coefficients, "--to", "mcap"},
       {"export", run, "--to", "csv"},

@@ -216,7 +216,8 @@ TEST_F(FitProgram, RefusesReportsComparisonsAndExportsOfWhatIsNotThere) {
   expect_refused({"compare", config, config}, 2, "not fitted yet; run `kphi fit");
   expect_refused({"export", config, "--to", "px4"}, 2, "not fitted yet; run `kphi fit");
   ASSERT_EQ(kphi({"fit", config, "--no-report"}).code, 0);
-  expect_refused({"export", config, "--to", "ardupilot"}, 2, "agilicious");
+  expect_refused({"export", config, "--to", "cleanflight"}, 2, "agilicious");
+  expect_refused({"export", config, "--to", "ardupilot"}, 2, "name the --vehicle");
   expect_refused({"fit", steps("mirrored", 1, 5, 3, -1)}, 5, "positive");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "300"}, 2, "0 to 270");
   expect_refused({"export", config, "--to", "gazebo", "--phi-deg", "nan"}, 2, "nan is not a finite number");

@@ -25,9 +25,11 @@ bool is_ours(std::string_view header) {
          std::any_of(rooms().begin(), rooms().end(), [&](const Room& room) { return is_in(room.folder, top); });
 }
 
-/// The library that flies: the standard library ("cmath") and Eigen; its reader of files also yaml-cpp.
+/// The library that flies: the standard library ("cmath") and Eigen; its reader of files also yaml-cpp, its
+/// module for Python pybind11.
 bool flies(std::string_view path, std::string_view header) {
   if (header.starts_with("Eigen/") || header.find_first_of("/.") == std::string_view::npos) return true;
+  if (path.starts_with("compensation/python/") && header.starts_with("pybind11/")) return true;
   return path.starts_with("compensation/file/") && header.starts_with("yaml-cpp/");
 }
 

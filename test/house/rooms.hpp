@@ -23,6 +23,7 @@ inline const std::vector<Room>& rooms() {
       {"compensation/file", {"compensation"}},
       {"compensation/flight", {"compensation", "base"}},
       {"compensation/integrations", {"compensation"}},
+      {"compensation/python", {"compensation"}},
       {"profiles", {"base", "compensation"}},
 
       {"drivers/serial", {"base"}},
@@ -79,7 +80,7 @@ inline const std::vector<Room>& rooms() {
       {"fit/coefficients", {"base", "compensation", "results", "fit"}},
       {"fit/report", {"base", "compensation", "results", "fit"}},
       {"fit/logs", {"base", "compensation", "results", "fit"}},
-      {"fit/export", {"base", "compensation", "results", "fit"}},
+      {"fit/export", {"base", "compensation", "profiles/vehicle.hpp", "results", "fit"}},
 
       // Drivers that are not kphi's own: what anybody's would see.
       {"examples/second_bench",

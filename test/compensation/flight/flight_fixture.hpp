@@ -66,7 +66,8 @@ inline compensation::ThrustCurve scaled_loss(const compensation::ThrustCurve& cu
 }
 
 inline Scene example_scene(std::uint64_t seed = 1) {
-  Truth world = assumed_world(example_vehicle());
+  Truth world;
+  world.drag = example_vehicle().build.air_drag_per_s;
   world.thrust_coefficient = bench_line().thrust_coefficient();
   world.mass = 1.01;
   world.thrust = {1.01, 0.99, 1.00, 1.01};

@@ -115,5 +115,25 @@ TEST(Flight, RefusesAVehicleThatNoControllerCanBeBuiltFor) {
   EXPECT_THROW((void)flown(kHoverPlain, scene), std::invalid_argument);
 }
 
+TEST(Flight, NoiseOfTheMotorsScattersItAndADelayOfTheGyroLosesAStiffController) {
+  const auto scatter = [](double noise) {
+    Scene scene = clean_scene();
+    scene.truth.motor_noise = noise;
+    return fly(kExperiments[kHoverCompensated], scene, example_shadow()).legs[1].deviation;
+  };
+  const double some = scatter(0.02);
+  EXPECT_GT(some, 2 * scatter(0));
+  EXPECT_NEAR(scatter(0.04) / some, 2, 0.4) << "twice the noise, twice the scatter";
+  const auto stiff_is_lost = [](double delay) {
+    Scene scene = clean_scene();
+    scene.pilot.gains.rate.head<2>() *= 4;
+    scene.truth.gyro_delay_s = delay;
+    return fly(kExperiments[kHoverCompensated], scene, example_shadow()).lost;
+  };
+  EXPECT_FALSE(stiff_is_lost(0));
+  EXPECT_FALSE(stiff_is_lost(0.006));
+  EXPECT_TRUE(stiff_is_lost(kLongestGyroDelay));
+}
+
 }  // namespace flight_test
 }  // namespace kphi::flight

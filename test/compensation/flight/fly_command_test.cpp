@@ -136,6 +136,40 @@ TEST_F(Fly, FliesUnlikePropellersWithAFileForEach) {
   EXPECT_EQ(wrong.code, 5) << wrong.out;
 }
 
+TEST_F(Fly, DoesNotCondemnAPropellerOfTwoBladesButOneWhoseThrustNoSuchPropellerHas) {
+  const auto two_blades = [](double k_t_share) {
+    const compensation::ThrustCurve curve = compensation::load_coefficients(coefficients_).curve;
+    const double k_t = k_t_share * from_newtons_per_rpm2(1.3e-8).value(),
+                 share = k_t / curve.thrust_coefficient().value();
+    const compensation::Line line = compensation::line_of(curve);
+    const std::string path = *folder_ / "two.yaml";
+    std::ofstream(path) << "format: kphi-coefficients/2\npropeller: {id: 5x2, diameter_in: 5, blades: 2}\n"
+                        << "k_unit: N/(rad/s)^2\noverlap: rim_arc\nK_T: {value: " << k_t
+                        << "}\ncurve: {form: line, anchored: false, intercept: {value: "
+                        << share * line.intercept.value()
+                        << "}, slope_per_deg: {value: " << share * line.slope_per_rad * kPi / 180
+                        << "}}\nvalid: {phi_deg: [0, 270]}\n";
+    return fly({}, path);
+  };
+  const Outcome right = two_blades(1), wrong = two_blades(1.5);
+  EXPECT_EQ(right.code, 0) << right.out;
+  EXPECT_THAT(right.out, HasSubstr("within 30 % of the 1.3e-08 N/RPM^2 published"));
+  EXPECT_EQ(wrong.code, 5) << wrong.out;
+  EXPECT_THAT(wrong.out, HasSubstr("the file's is off by +50 %"));
+}
+
+TEST_F(Fly, FliesAnotherShapeOfTheVehicleForO) {
+  const auto sags = [](const Outcome& flown) {
+    const auto flights = nlohmann::json::parse(flown.out)["flights"];
+    const auto of = [&](std::size_t i) { return flights[i]["legs"][1]["mean_error_m"][2].get<double>(); };
+    return of(0) - of(1);  // without compensation, with it
+  };
+  EXPECT_GT(sags(fly({"--json"})), 0.08);
+  EXPECT_LT(std::fabs(sags(fly({"--folded", "H", "--json"}))), 0.02) << "nothing is covered in H";
+  EXPECT_THAT(fly({"--folded", "H"}).out, HasSubstr("for O: shape H"));
+  EXPECT_EQ(fly({"--folded", "Z"}).code, 2);
+}
+
 TEST_F(Fly, FliesOneExperimentAlone) {
   const Outcome flown = fly({"--experiment", "level_o_switched"});
   ASSERT_EQ(flown.code, 0) << flown.err;
@@ -171,15 +205,18 @@ TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare)
 TEST_F(Fly, FliesInAWorldThatTheControllerDoesNotKnowAndSaysWhetherTheCoefficientsAreFitToFly) {
   const Outcome assumed = fly({"--draws", "8"});
   EXPECT_EQ(assumed.code, 0) << assumed.out;
-  EXPECT_THAT(assumed.out, HasSubstr("assumed for three blades of this radius; --world FILE tells another"));
-  EXPECT_THAT(assumed.out, HasSubstr("verdict: fit to fly in this world; the vehicle is lost in 0 of 8 draws"));
+  EXPECT_THAT(assumed.out, HasSubstr("the file's own: within 30 % of the 1.7e-08 N/RPM^2 published"));
+  EXPECT_THAT(assumed.out,
+              testing::StartsWith("verdict: fit to fly in this world; the vehicle is lost in 0 of 8 draws"));
+  EXPECT_THAT(assumed.out, HasSubstr("it would say the same of a k(φ) that falls "));
 
   const std::string world = *folder_ / "world.yaml";
   std::ofstream(world)
       << "format: kphi-world/1\nname: thin\nk_t_n_per_rpm2: 0.85e-8\nloss_law: quadratic\ngamma: 1.4\n";
   const Outcome thin = fly({"--draws", "8", "--world", world});
   EXPECT_EQ(thin.code, 5);
-  EXPECT_THAT(thin.out, HasSubstr("verdict: NOT fit to fly in this world\n- would lose the vehicle in 8 of 8 draws"));
+  EXPECT_THAT(thin.out,
+              testing::StartsWith("verdict: NOT fit to fly in this world\n- would lose the vehicle in 8 of 8 draws"));
   const auto told = nlohmann::json::parse(fly({"--draws", "2", "--world", world, "--json"}).out);
   EXPECT_EQ(told["verdict"]["fitness"], "loses_the_vehicle");
   EXPECT_EQ(told["world"]["file"], world);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <set>
 
 #include "test/compensation/flight/flight_fixture.hpp"
 
@@ -45,6 +46,29 @@ TEST(Reproduction, JudgesEachNumberByTheSpreadOfTheDraws) {
   const std::string table = reproduction_table(cells, 1.4);
   EXPECT_THAT(table, HasSubstr("gamma 1.4"));
   EXPECT_THAT(table, HasSubstr("not reproduced"));
+
+  // Table and list agree: a reason for each number that is not reproduced, and no other.
+  const std::string list = not_reproduced(cells);
+  std::set<Reason> used;
+  for (const PaperCell& cell : cells)
+    if (cell.reproduced == Reproduced::not_reproduced) used.insert(cell.reason);
+  const auto listed = reasons_of(cells);
+  EXPECT_EQ(std::set<Reason>(listed.begin(), listed.end()), used);
+  EXPECT_GE(used.size(), 2u);
+  for (const Reason reason : used) {
+    const std::string letter = std::string("(") + letter_of(reason) + ")";
+    EXPECT_THAT(table, HasSubstr("not reproduced " + letter));
+    EXPECT_THAT(list, HasSubstr(letter + " " + std::string(kReasons[static_cast<std::size_t>(reason)])));
+  }
+  EXPECT_EQ(std::count(list.begin(), list.end(), '\n'), static_cast<long>(used.size()) + 1);
+}
+
+TEST(Reproduction, WithoutDrawsNamesTheReasonsThatThereMayBe) {
+  const NineFlights flights = fly_all(clean_scene(), example_shadow());
+  const auto cells = paper_cells(flights, flights, {}, example_gains());
+  EXPECT_EQ(reasons_of(cells).size(), kReasons.size());
+  EXPECT_THAT(not_reproduced(cells), HasSubstr("--draws 300 tells which"));
+  EXPECT_EQ(not_reproduced({}), "");
 }
 
 TEST(Reproduction, SaysLostInsteadOfANumber) {

@@ -154,5 +154,28 @@ TEST(Draw, StaysWithinItsStatedRanges) {
   EXPECT_NEAR(std::sqrt(squares / 600), 0.01, 0.001);
 }
 
+TEST(AssumedWorld, HasTheThrustOfTheFilesPropellerWhereSuchOnesHaveIt) {
+  const auto world = [](double k_t, const PropellerKind& kind) {
+    const compensation::ThrustCurve curve = *compensation::ThrustCurve::from_line(
+        from_newtons_per_rpm2(k_t), from_newtons_per_rpm2(k_t), 0, from_degrees(270));
+    return assumed_world(example_vehicle(), kind, {curve, curve, curve, curve});
+  };
+  EXPECT_NEAR(to_newtons_per_rpm2(published_thrust({5, 3})), 1.7e-8, 1e-20);
+  EXPECT_NEAR(to_newtons_per_rpm2(published_thrust({5, 2})), 1.3e-8, 1e-20);
+  EXPECT_NEAR(to_newtons_per_rpm2(published_thrust({6, 2})), 2.6e-8, 1e-20);
+  EXPECT_NEAR(to_newtons_per_rpm2(published_thrust({6, 3})), 3.1e-8, 1e-20);
+  EXPECT_NEAR(published_thrust({10, 3}) / published_thrust({5, 3}), 16 * 3.1 / 1.7 * std::pow(5.0 / 6, 4), 1e-9);
+  for (const double measured : {1.11e-8, 1.27e-8, 1.3e-8}) {
+    const AssumedWorld two = world(measured, {5, 2});
+    EXPECT_TRUE(two.as_in_file) << measured;
+    EXPECT_NEAR(to_newtons_per_rpm2(two.truth.thrust_coefficient), measured, 1e-20);
+  }
+  EXPECT_FALSE(world(2.6e-8, {5, 2}).as_in_file) << "twice what such a propeller has";
+  EXPECT_NEAR(to_newtons_per_rpm2(world(2.6e-8, {5, 2}).truth.thrust_coefficient), 1.3e-8, 1e-20);
+  EXPECT_TRUE(world(1.2e-8, {}).as_in_file) << "blades unknown: two or three, of the vehicle's size";
+  EXPECT_FALSE(world(3.1e-8, {}).as_in_file);
+  EXPECT_TRUE(world(3.1e-8, {6, 3}).as_in_file);
+}
+
 }  // namespace study_test
 }  // namespace kphi::flight

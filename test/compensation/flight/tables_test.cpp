@@ -34,11 +34,6 @@ TEST(FindingsTable, HasNoNumbersWhereEveryDrawLostAFlight) {
   EXPECT_THAT(findings_table(found), Not(HasSubstr("0.000")));
 }
 
-TEST(NotReproduced, NamesTheXBaselineAndTheVelocityTerm) {
-  EXPECT_THAT(not_reproduced(), HasSubstr("the errors in X of Tables I and III"));
-  EXPECT_THAT(not_reproduced(), HasSubstr("the velocity term of Table II"));
-}
-
 std::vector<std::string> lines_of(const std::string& text) {
   std::vector<std::string> lines;
   std::istringstream stream(text);

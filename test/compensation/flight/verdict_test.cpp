@@ -65,6 +65,29 @@ TEST(Verdict, OfALineThatFallsTooSteeplyTooLittleOrRisesSaysSo) {
     EXPECT_THAT(judged(wrong(1, fall)).judgement.doubts, testing::Contains(HasSubstr("does not help"))) << fall;
 }
 
+TEST(Verdict, SaysWhatItIsBlindTo) {
+  const Scene scene = example_scene();
+  const BlindZone blind = blind_zone_of(scene, example_shadow());
+  const auto verdict_of = [&](double fall, double k_t) {
+    Scene changed = scene;
+    changed.curves = four(*bench_line().perturbed(ThrustCoefficient(0), fall));
+    changed.truth.thrust_coefficient = scene.truth.thrust_coefficient / k_t;
+    return judgement_of(findings_of({{changed, fly_all(changed, example_shadow())}})).fitness;
+  };
+  EXPECT_LT(blind.least_fall, 1);
+  EXPECT_GT(blind.most_fall, 1.2) << "a fall half as steep again passes";
+  EXPECT_LT(blind.most_fall, 3);
+  EXPECT_GT(blind.least_k_t, 0.8);
+  EXPECT_LT(blind.most_k_t, 1.2);
+  for (const auto& [fall, k_t] :
+       {std::pair{blind.least_fall, 1.0}, {blind.most_fall, 1.0}, {1.0, blind.least_k_t}, {1.0, blind.most_k_t}})
+    EXPECT_EQ(verdict_of(fall, k_t), Fitness::fit_to_fly) << fall << " " << k_t;
+  for (const auto& [fall, k_t] : {std::pair{0.0, 1.0}, {3.0, 1.0}, {1.0, 0.8}, {1.0, 1.2}})
+    EXPECT_NE(verdict_of(fall, k_t), Fitness::fit_to_fly) << fall << " " << k_t;
+  EXPECT_THAT(words_of(blind, true), HasSubstr(fmt::format("{:g} to {:g} times", blind.least_fall, blind.most_fall)));
+  EXPECT_THAT(words_of(blind, false), HasSubstr("the air has that of the file"));
+}
+
 TEST(Verdict, OfArmsThatAreWiredCrosswiseIsNotFitToFly) {
   EXPECT_NE(judged(bench_line(), {{2, 1, 0, 3}}).judgement.fitness, Fitness::fit_to_fly);
 }

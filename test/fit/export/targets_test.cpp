@@ -11,9 +11,11 @@
 #include "base/error.hpp"
 #include "fit/coefficients/coefficients.hpp"
 #include "fit/logs/import_table.hpp"
+#include "profiles/vehicle.hpp"
 #include "test/compensation/line_of.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/fit/export/outside_reader.hpp"
+#include "test/source_dir.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::fit {
@@ -39,6 +41,11 @@ compensation::Coefficients coefficients(CurveForm form = CurveForm::line) {
 
 const compensation::Coefficients& file() {
   static const compensation::Coefficients kOnce = coefficients();
+  return kOnce;
+}
+
+const profiles::Vehicle& drone() {
+  static const profiles::Vehicle kOnce = profiles::load_vehicle(test::source_dir() + "/profiles/foldable_drone.yaml");
   return kOnce;
 }
 
@@ -179,39 +186,6 @@ TEST(Gazebo, IsReadByXmllint) {
   EXPECT_EQ(read("count(//plugin)"), 4);
 }
 
-void expect_header_of(const compensation::Coefficients& file) {
-  const TemporaryFolder folder;
-  test::write_file(folder.path() / "k.hpp", to_header(file, {}).text);
-  test::write_file(folder.path() / "main.cpp", R"(#include "k.hpp"
-#include <cstdio>
-static_assert(kphi_5x3::scaling_factor(0.0) == 1.0, "");
-static_assert(kphi_5x3::scaling_factor(100.0) == 0.1, "");
-int main() {
-  for (int degrees = 0; degrees <= 360; degrees += 15)
-    std::printf("%.17g\n", kphi_5x3::scaling_factor(degrees * 3.14159265358979323846 / 180));
-  std::printf("%.17g\n", kphi_5x3::squared_speed(5.0, 1.0));
-}
-)");
-  const std::string binary = (folder.path() / "main").string();
-  const auto compiled =
-      read_with("c++ -std=c++14 -Wall -Wextra -Wpedantic -Werror -o " + binary + " " + binary + ".cpp");
-  ASSERT_EQ(compiled.status, 0) << compiled.out;
-  const auto ran = read_with(binary);
-  std::istringstream numbers(ran.out);
-  double value = 0;
-  for (int degrees = 0; degrees <= 360; degrees += 15) {
-    numbers >> value;
-    EXPECT_NEAR(value, file.curve.scaling_factor(from_degrees(degrees)), 1e-15) << degrees;
-  }
-  numbers >> value;
-  EXPECT_NEAR(value, 5.0 / (file.curve.thrust_coefficient().value() * file.curve.scaling_factor(Radians(1.0))), 1e-6);
-}
-
-TEST(Header, IsReadByACompilerAndAgreesWithTheLibraryThatFlies) {
-  if (!works("c++ --version")) GTEST_SKIP() << "no compiler";
-  for (const CurveForm form : kCurveForms) expect_header_of(coefficients(form));
-}
-
 TEST(Ros2, HasTheKnotsOfATable) {
   const std::string text = to_ros2(coefficients(CurveForm::table), {}).text;
   EXPECT_THAT(text, HasSubstr("curve_phi_rad: [0.0, 0.785"));
@@ -221,13 +195,14 @@ TEST(Ros2, HasTheKnotsOfATable) {
 TEST(Targets, SayThatTheyDropAChangeOfKWithTheSpeed) {
   compensation::Coefficients bent = coefficients();
   ASSERT_TRUE(bent.curve.set_speed_trend({1e-4, RadPerSec(1500)}));
+  const std::set<std::string> constant{"agilicious", "gazebo", "ardupilot"};
   for (const Target& target : targets()) {
-    if (target.name == std::string("csv") || target.name == std::string("mcap")) continue;
-    const Export made = target.write(bent, {.turns = parse_turns("ccw,ccw,cw,cw")});
+    const Export made = target.write(bent, {.vehicle = &drone()});
     const bool said =
         std::ranges::any_of(made.lost, [](const std::string& one) { return one.starts_with("change of k"); });
-    EXPECT_EQ(said, made.text.find("speed_trend") == std::string::npos) << target.name;
+    EXPECT_EQ(said, constant.contains(target.name)) << target.name;
   }
+  EXPECT_THAT(to_px4(bent, {}).lost, Contains(HasSubstr("change of k"))) << "PX4's own multirotor cannot hold it";
 }
 
 TEST(CsvExport, IsFittedAgainToTheSameCoefficients) {
@@ -246,18 +221,32 @@ TEST(Targets, SayWhatTheyCannotHold) {
   for (const Target& target : targets()) {
     SCOPED_TRACE(target.name);
     EXPECT_TRUE(names.insert(target.name).second);
-    const Export result = target.write(file(), {});
+    const Export result = target.write(file(), {.vehicle = &drone()});
     EXPECT_FALSE(result.text.empty());
     EXPECT_FALSE(result.lost.empty());
     for (const std::string& reason : result.lost) EXPECT_THAT(reason, HasSubstr(": ")) << "what, and why";
   }
-  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "header", "csv", "mcap"}));
+  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "c", "ardupilot", "csv", "mcap"}));
 }
 
 TEST(Targets, RefuseAnOcclusionThatWasNotMeasured) {
   for (const auto write : {to_agilicious, to_px4, to_gazebo}) {
     for (const double phi : {300.0, -1.0}) EXPECT_THROW((void)write(file(), {.phi_deg = phi}), ConfigurationError);
   }
+}
+
+TEST(Targets, RefuseAVehicleThatTheyCannotFly) {
+  EXPECT_THROW((void)to_ardupilot(file(), {}), ConfigurationError) << "no vehicle, no arms";
+  profiles::Vehicle other = drone();
+  other.overlap = compensation::OverlapMeasure::area_share;
+  for (const auto write : {to_c, to_px4, to_ros2, to_ardupilot})
+    EXPECT_THROW((void)write(file(), {.vehicle = &other}), ConfigurationError) << "another measure of the overlap";
+  other = drone();
+  other.dynamics->spin = {1, 1, -1, -1};
+  EXPECT_THROW((void)to_c(file(), {.vehicle = &other}), ConfigurationError);
+  other.dynamics.reset();
+  EXPECT_THROW((void)to_px4(file(), {.vehicle = &other}), ConfigurationError);
+  EXPECT_THROW((void)to_px4(file(), {.phi_deg = 45, .vehicle = &drone()}), ConfigurationError);
 }
 
 TEST(Targets, ThatNeedASpeedSaySo) {

@@ -1,10 +1,12 @@
-// Of PX4 (src/modules/control_allocator) what a child of ActuatorEffectiveness uses: the same names and signatures.
+// Of PX4 (src/lib/control_allocation, src/modules/control_allocator) what a child of ActuatorEffectiveness meets: the
+// same names and signatures.
 #pragma once
 
 #include <cstdint>
 
 #include "matrix/matrix/math.hpp"
 
+enum class AllocationMethod { NONE = -1, PSEUDO_INVERSE = 0, SEQUENTIAL_DESATURATION = 1, AUTO = 2 };
 enum class ActuatorType { MOTORS = 0, SERVOS, COUNT };
 enum class EffectivenessUpdateReason { NO_EXTERNAL_UPDATE = 0, CONFIGURATION_UPDATE = 1, MOTOR_ACTIVATION_UPDATE = 2 };
 
@@ -31,6 +33,12 @@ class ActuatorEffectiveness {
     int num_actuators[static_cast<int>(ActuatorType::COUNT)]{};
   };
 
+  virtual void getDesiredAllocationMethod(AllocationMethod allocation_method_out[MAX_NUM_MATRICES]) const {
+    for (int i = 0; i < MAX_NUM_MATRICES; ++i) allocation_method_out[i] = AllocationMethod::PSEUDO_INVERSE;
+  }
+  virtual void getNormalizeRPY(bool normalize[MAX_NUM_MATRICES]) const {
+    for (int i = 0; i < MAX_NUM_MATRICES; ++i) normalize[i] = false;
+  }
   virtual bool getEffectivenessMatrix(Configuration&, EffectivenessUpdateReason) { return false; }
   virtual void updateSetpoint(const matrix::Vector<float, NUM_AXES>&, int, ActuatorVector&, const ActuatorVector&,
                               const ActuatorVector&) {}

@@ -3,12 +3,16 @@
 #pragma once
 
 #include <any>
+#include <cstdio>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace rclcpp {
+
+struct Logger {};
 
 class Duration {
  public:
@@ -28,7 +32,9 @@ class Time {
   double seconds_;
 };
 
-inline std::map<std::string, double> parameters;
+/// Of the type that its YAML has; another one throws, as rclcpp does.
+inline std::map<std::string, std::any> parameters;
+inline std::vector<std::string> warnings;
 inline std::map<std::string, std::any> published;
 inline std::map<std::string, std::function<void(const std::any&)>> subscriptions;
 inline std::function<void()> on_spin;
@@ -57,7 +63,7 @@ class Node {
   template <class Value>
   Value declare_parameter(const std::string& name, const Value& otherwise) {
     const auto found = parameters.find(name);
-    return found == parameters.end() ? otherwise : found->second;
+    return found == parameters.end() ? otherwise : std::any_cast<Value>(found->second);
   }
   template <class Message>
   std::shared_ptr<Publisher<Message>> create_publisher(const std::string& topic, int) {
@@ -70,6 +76,7 @@ class Node {
     };
     return std::make_shared<Subscription<Message>>();
   }
+  [[nodiscard]] Logger get_logger() const { return {}; }
   [[nodiscard]] Time now() const { return Time(clock_s); }
 };
 
@@ -78,3 +85,11 @@ inline void spin(const std::shared_ptr<Node>&) { on_spin(); }
 inline void shutdown() {}
 
 }  // namespace rclcpp
+
+#define RCLCPP_WARN(logger, ...)                         \
+  do {                                                   \
+    (void)(logger);                                      \
+    char warning[400];                                   \
+    std::snprintf(warning, sizeof warning, __VA_ARGS__); \
+    rclcpp::warnings.emplace_back(warning);              \
+  } while (false)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "rclcpp/rclcpp.hpp"
@@ -12,6 +13,7 @@ struct JointState {
   struct Header {
     rclcpp::Time stamp;
   } header;
+  std::vector<std::string> name;
   std::vector<double> position, velocity;
 };
 

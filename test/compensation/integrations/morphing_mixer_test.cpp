@@ -1,16 +1,14 @@
-// The child of PX4's ActuatorEffectiveness and the mixer in C, flown on the default vehicle.
+// The mixer in C, flown on the default vehicle.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <cmath>
 
-#include "compensation/integrations/px4_morphing_rotors.hpp"
-
 extern "C" {
 #include "compensation/integrations/morphing_mixer.h"
 }
 
-namespace {
+namespace morphing_mixer_test {
 
 constexpr float kPi = 3.14159265F, kDrag = 0.0133F, kFastest = 2000.0F, kCoefficient = 1.55e-6F;
 constexpr float kFull = kCoefficient * kFastest * kFastest;
@@ -82,82 +80,4 @@ TEST(MorphingMixerInC, SaysInWordsWhyAVehicleCannotBeFlown) {
   EXPECT_NE(std::string(morphingInit(&state, &of, kX)).find("spins"), std::string::npos);
 }
 
-class Px4 : public testing::Test {
- protected:
-  Px4() {
-    morphingState_t state;
-    EXPECT_EQ(morphingInit(&state, &of, kX), nullptr);
-    compensator = state.compensator;
-    rotors.emplace(compensator, of.masses, 4, of.spins, kFull, kDrag);
-  }
-  void arms(const float* angles) {
-    rotors->armsMeasured(angles, kStill, 0);
-    kphi_set_arms(&compensator, angles);
-  }
-  bool update(EffectivenessUpdateReason reason = EffectivenessUpdateReason::NO_EXTERNAL_UPDATE) {
-    ActuatorEffectiveness::Configuration fresh;
-    if (!rotors->getEffectivenessMatrix(fresh, reason)) return false;
-    configuration = fresh;
-    return true;
-  }
-  /// What PX4's allocation makes of a wrench in its frame (y right, z down), then the update of the set-point.
-  void allocate(float thrust, float roll, float pitch, float yaw) {
-    Eigen::Matrix4f matrix;
-    for (int i = 0; i < 4; ++i) {
-      const auto& effectiveness = configuration.effectiveness_matrices[0];
-      matrix.col(i) << effectiveness(5, i), effectiveness(0, i), effectiveness(1, i), effectiveness(2, i);
-    }
-    const Eigen::Vector4f outputs = matrix.inverse() * Eigen::Vector4f(-thrust, roll, -pitch, -yaw);
-    ActuatorEffectiveness::ActuatorVector set_point, lowest, highest;
-    for (int i = 0; i < 4; ++i) {
-      set_point(i) = outputs[i];
-      highest(i) = 1;
-    }
-    rotors->updateSetpoint({}, 0, set_point, lowest, highest);
-    for (int i = 0; i < 4; ++i) throttle[i] = std::sqrt(set_point(i));  // THR_MDL_FAC = 1
-  }
-
-  morphingVehicle_t of = vehicle();
-  kphi_compensator compensator{};
-  std::optional<ActuatorEffectivenessMorphing> rotors;
-  ActuatorEffectiveness::Configuration configuration;
-  float throttle[4]{};
-};
-
-TEST_F(Px4, MakesTheMatrixOfTheShape) {
-  for (const float* shape : {kX, kO}) {
-    arms(shape);
-    ASSERT_TRUE(update());
-    EXPECT_EQ(configuration.num_actuators[0], 4);
-    allocate(6, 0.02F, -0.03F, 0.005F);
-    expect_wrench(wrench_of(compensator, of, throttle), {6, 0.02F, -0.03F, 0.005F});
-    EXPECT_EQ(rotors->flags(), 0u);
-  }
-}
-
-TEST_F(Px4, KeepsItsThrustsBetweenTwoMatrices) {
-  const float nearly_o[4] = {kPi - 0.1F, kPi - 0.1F, kPi - 0.35F, kPi - 0.1F};
-  arms(nearly_o);
-  ASSERT_TRUE(update());
-  arms(kO);  // and PX4 does not ask for a matrix yet
-  allocate(6, 0, 0, 0);
-  EXPECT_NEAR(wrench_of(compensator, of, throttle)[0], 6, 1e-4);
-}
-
-TEST_F(Px4, HasNothingNewWhereNoArmMoved) {
-  arms(kX);
-  ASSERT_TRUE(update());
-  EXPECT_FALSE(update());
-  EXPECT_TRUE(update(EffectivenessUpdateReason::CONFIGURATION_UPDATE));
-}
-
-TEST_F(Px4, TellsTheFlagsOfItsArms) {
-  const float degrees[4] = {45, 45, 45, 45};
-  arms(kX);
-  ASSERT_TRUE(update());
-  arms(degrees);
-  allocate(6, 0, 0, 0);
-  EXPECT_EQ(rotors->flags(), static_cast<unsigned>(KPHI_ARM_ANGLE_BEYOND));
-}
-
-}  // namespace
+}  // namespace morphing_mixer_test
