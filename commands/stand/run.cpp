@@ -152,8 +152,8 @@ void announce(const RunRequest& request, const DryRun& dry) {
 }
 
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
-CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination,
-                       Operator& person, live::LiveSession& view, const std::function<bool()>& stop_asked) {
+void execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination, Operator& person,
+             live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const SoFar known = so_far(request.campaign, request.options.wishes);
   const RunOptions& options = request.options;
   const profiles::Campaign& campaign = request.campaign;
@@ -161,17 +161,21 @@ CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, De
   const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
   const auto bench = connect_awake(config, stop_asked);
-  const std::vector<BenchFinding> findings =
-      audit_bench(*bench, campaign, config);  // faults throw before a folder is made
-  const auto bytes = static_cast<std::uint64_t>(
-      destination.share_left(plan) * static_cast<double>(bytes_needed(longest_plan(campaign, config), config)));
-  results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
-  if (!destination.folder) destination.create(options, campaign, *bench);
-  PrintedProgress printed(stderr, has_terminal());
-  const auto progress = view.beside(printed, bench->clock());
-  return view.tell_the_end([&] {
-    return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
-                        destination.resumption ? &*destination.resumption : nullptr, &findings, known);
+  leave_without_power(*bench, [&] {
+    const std::vector<BenchFinding> findings =
+        audit_bench(*bench, campaign, config);  // faults throw before a folder is made
+    const auto bytes = static_cast<std::uint64_t>(
+        destination.share_left(plan) * static_cast<double>(bytes_needed(longest_plan(campaign, config), config)));
+    results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes,
+                          bench->files());
+    if (!destination.folder) destination.create(options, campaign, *bench);
+    PrintedProgress printed(stderr, has_terminal());
+    const auto progress = view.beside(printed, bench->clock());
+    const CampaignResult result = view.tell_the_end([&] {
+      return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
+                          destination.resumption ? &*destination.resumption : nullptr, &findings, known);
+    });
+    summarise(result, destination.folder->path().string(), options.json);
   });
 }
 
@@ -200,8 +204,7 @@ ExitCode run(const RunOptions& options) {
   clear_safety_stop(destination, *operator_, answers);
   if (const auto doubts = profiles::doubts_of(campaign); !doubts.empty() && !destination.resumption)
     operator_->accept_doubts(fmt::format("{}", fmt::join(doubts, "\n")));
-  const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
-  summarise(result, destination.folder->path().string(), options.json);
+  execute(request, dry.plan, destination, *operator_, view, stop_asked);
   operator_->finish();
   return ExitCode::ok;
 }

@@ -94,7 +94,7 @@ class ModulePower {
  private:
   LiveSupply supply_;
   Sentinel sentinel_;
-  OutputEnable on_;
+  MotorPower on_;
 };
 
 class LiveBench final : public Bench {
@@ -126,6 +126,8 @@ class LiveBench final : public Bench {
   void tell_simulation(const std::string& line);
   /// The last check before its output comes on. Throws Interrupted, SafetyStop.
   [[nodiscard]] SupplyLink* supply_to_switch_on(const std::function<bool()>& stop_asked);
+  /// Of whatever kind. What it throws says, too, if its supply has not confirmed that it is off again.
+  [[nodiscard]] std::unique_ptr<MotorLink> connect_motor_with_power(const StopAsked& stop_asked);
 
   profiles::BenchConfig config_;
   SteadyClock clock_;

@@ -8,6 +8,7 @@
 
 #include "daq/bench/bench.hpp"
 #include "daq/bench/device_records.hpp"
+#include "daq/guard/run_stopped.hpp"
 
 namespace kphi::daq {
 
@@ -41,6 +42,7 @@ class QueueSupply final : public SupplyLink {
   void switch_on(const StopAsked&) override {
     on = true;
     if (refuses) throw std::runtime_error("no");
+    if (interrupted) throw Interrupted("stopped by request");
   }
 };
 
