@@ -251,12 +251,11 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
       throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
-  SlotPages slots = read_slot_pages([&](const std::string& target) {
-    require_no_stop(stop_asked, kBeforePower);
-    return page_of(config_, target);
-  });
-  slots_json_ = std::move(slots.json);
-  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
+  require_no_stop(stop_asked, kBeforePower);
+  CalibrationPage page = read_calibration_page([&](const std::string& target) { return page_of(config_, target); },
+                                               cell_->configuration().calibration);
+  slots_json_ = std::move(page.json);
+  findings_.insert(findings_.end(), page.findings.begin(), page.findings.end());
 }
 
 results::LoadCellScale LiveLoadCell::start() {

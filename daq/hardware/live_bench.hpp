@@ -57,8 +57,8 @@ class LiveMotor final : public MotorLink {
 class LiveLoadCell final : public LoadCellLink {
  public:
   /// Applies the settings of the bench file, reads the configuration, checks it against the one over TCP, reads the
-  /// pages of all slots. The destructor, or the next program, restores the box's settings. `stop_asked` is checked
-  /// before each page. Throws DeviceError, Interrupted.
+  /// page of its calibration. The destructor, or the next program, restores the box's settings. Throws DeviceError,
+  /// Interrupted.
   LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked);
   [[nodiscard]] results::LoadCellScale scale() const override { return to_scale(cell_->configuration()); }
   [[nodiscard]] const netbox::Configuration* box() const override { return &cell_->configuration(); }

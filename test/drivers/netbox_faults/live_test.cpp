@@ -154,4 +154,14 @@ TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
   EXPECT_FALSE(std::filesystem::exists(journal));
 }
 
+TEST_F(SlowWeb, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
+  write_and_set_back({.only_three_writes = true});
+}
+
+TEST_F(SlowWeb, SettingsAreWrittenAndSetBackOnABoxThatServesThreeRequestsASecond) {
+  using Served = sim::NetBoxQuirks::Served;
+  for (const Served served : {Served::three_then_closed, Served::three_then_503})
+    write_and_set_back({.served = served});
+}
+
 }  // namespace kphi::netbox::test::live_test
