@@ -84,16 +84,17 @@ void ModbusSupply::describe() {
   identity_.current_max_a = range().max_a;
 }
 
-SupplyReading ModbusSupply::read() {
+SupplyReading ModbusSupply::read(const std::function<void()>& between) {
   SupplyReading reading;
-  persist("read", [&] { return look(reading); });
+  persist("read", [&] { return look(reading, between); });
   return reading;
 }
 
-Outcome ModbusSupply::look(SupplyReading& reading) {
+Outcome ModbusSupply::look(SupplyReading& reading, const std::function<void()>& between) {
   const Instant before = clock_.now();
   for (const Block& block : model_->map->look) {
     if (block.count == 0) continue;
+    if (&block != model_->map->look.data()) between();
     if (Outcome outcome = link_.read(block, registers_); !outcome.ok()) return outcome;
   }
   const Instant after = clock_.now();

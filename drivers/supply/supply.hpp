@@ -5,6 +5,7 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -62,7 +63,11 @@ class Supply {
   /// Sets all four, thresholds first, reads back every readable one, and returns the settings as sent, rounded to the
   /// device's steps. Throws std::invalid_argument for a value that is negative, not finite, or beyond the maximum.
   virtual Limits apply(const Limits& limits) = 0;
-  [[nodiscard]] virtual SupplyReading read() = 0;
+  /// `between` is called before each question after the first, and may throw, to leave the reading.
+  [[nodiscard]] virtual SupplyReading read(const std::function<void()>& between) = 0;
+  [[nodiscard]] SupplyReading read() {
+    return read([] {});
+  }
   /// Returns when the device has reported that its output is off; also when it was off before.
   virtual void switch_off() = 0;
 
