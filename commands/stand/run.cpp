@@ -70,6 +70,11 @@ profiles::Campaign campaign_of(const RunOptions& options) {
   return profiles::load_campaign(file.string());
 }
 
+/// Where files will be made, or the parent of it.
+std::filesystem::path folder_of(const RunOptions& options) {
+  return options.resume.empty() ? options.out : options.resume;
+}
+
 /// The campaign's folder, and how far it is.
 struct Destination {
   std::optional<results::CampaignFolder> folder;
@@ -131,15 +136,18 @@ struct RunRequest {
 ExitCode print_plan(const RunRequest& request) {
   announce_origin(request.config);
   const auto& [options, campaign, config, answers] = request;
-  const DryRun dry = dry_run(campaign, config, options.out, answers);
+  const DryRun dry = dry_run(campaign, config, folder_of(options), answers);
   fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
   return dry.ok() ? ExitCode::ok : ExitCode::usage;
 }
 
-/// What no later check would say before the first device turns or the folder is made.
-void require_possible(const DryRun& dry) {
+/// What no later check would say before the first device turns or the folder is made. Of a resumed campaign, what its
+/// disk refuses.
+void require_possible(const DryRun& dry, bool resumed) {
+  for (const Finding& finding : dry.files)
+    if (finding.severity == Severity::fault) throw ConfigurationError(finding.words());
   for (const PlanCheck& check : dry.checks)
-    if (check.finding.severity == Severity::fault)
+    if (!resumed && check.finding.severity == Severity::fault)
       throw ConfigurationError(check.subject + ": " + check.finding.words());
 }
 
@@ -186,11 +194,11 @@ ExitCode run(const RunOptions& options) {
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;
   profiles::require_within(campaign, config);
-  const DryRun dry = dry_run(campaign, config, options.out, answers);
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, config);
   if (destination.finished) return print_finished(destination, options.json);
-  if (!destination.resumption) require_possible(dry);
+  const DryRun dry = dry_run(campaign, config, folder_of(options), answers);
+  require_possible(dry, destination.resumption.has_value());
   // A resumption asks only for the missing runs: the operator reports missing answers.
   if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan);
   const SignalWatch signals;  // before the words that promise it
