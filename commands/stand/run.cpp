@@ -53,11 +53,16 @@ std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<
 }
 
 void summarise(const CampaignResult& result, const std::string& folder, bool json) {
-  const nlohmann::json all{{"folder", folder},    {"runs", result.runs},   {"samples", result.samples},
-                           {"lost", result.lost}, {"steps", result.steps}, {"flagged_steps", result.flagged_steps}};
+  const nlohmann::json all{{"folder", folder},
+                           {"runs", result.runs},
+                           {"samples", result.samples},
+                           {"lost", result.lost},
+                           {"steps", result.steps.steps},
+                           {"flagged_steps", result.steps.flagged},
+                           {"flags", results::flag_counts(result.steps)}};
   put(stdout, (json ? all.dump() : folder) + "\n");
-  put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps flagged\nnext: kphi fit {}\n", result.runs,
-                          result.samples, result.lost, result.flagged_steps, result.steps, folder));
+  put(stderr, fmt::format("{} runs, {} samples, {} lost, {}\nnext: kphi fit {}\n", result.runs, result.samples,
+                          result.lost, results::in_words(result.steps), folder));
 }
 
 profiles::Campaign campaign_of(const RunOptions& options) {

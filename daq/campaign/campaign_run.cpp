@@ -359,27 +359,28 @@ class CampaignRun {
     note(results::kRunAccepted, accepted);
     const auto [means, zero] = reduce_with_zeros(recording);
     review_.add(run.file.filename().string(), means);
-    const int flagged = count(run.file, recording, means);
+    const results::FlaggedSteps flagged = count(run.file, recording, means);
     review_.write(folder_, bench_.files());
     for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}{}", result_.runs,
-                              planned_, run.file.filename().string(), run.account.received, lost, flagged, means.size(),
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {}{}{}", result_.runs, planned_,
+                              run.file.filename().string(), run.account.received, lost, results::in_words(flagged),
                               run.steps_not_needed > 0 ? fmt::format(", {} not needed", run.steps_not_needed) : "",
                               rest_words(run.stop)));
     if (!so_far_ || planned.is_reference()) return;
     if (const std::string words = so_far_(review_.steps()); !words.empty()) progress_.reached(words);
   }
 
-  /// Returns how many of its steps are flagged.
-  int count(const std::filesystem::path& file, const results::RunRecording& run,
-            const std::vector<results::StepMean>& means) {
-    int flagged = 0;
-    for (const auto& step : means) flagged += step.quality_flags != 0;
+  /// Returns the flags of its steps.
+  results::FlaggedSteps count(const std::filesystem::path& file, const results::RunRecording& run,
+                              const std::vector<results::StepMean>& means) {
+    results::FlaggedSteps flagged;
+    for (const auto& step : means) {
+      flagged.add(step.quality_flags);
+      result_.steps.add(step.quality_flags);
+    }
     ++result_.runs;
     result_.samples += run.account.received;
     result_.lost += run.account.lost_network + run.account.lost_host;
-    result_.steps += static_cast<int>(means.size());
-    result_.flagged_steps += flagged;
     accepted_.insert(file.filename().string());
     return flagged;
   }
