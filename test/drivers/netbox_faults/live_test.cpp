@@ -130,13 +130,18 @@ TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
   settings.stream = 300ms;
   const Probe found = probe(address(), clock, settings);
   std::string all;
-  for (const std::string& line : found.lines()) all += line + "\n";
+  for (const Finding& finding : found.findings) all += finding.line() + "\n";
   EXPECT_THAT(all, HasSubstr("the box reports: force or torque out of range"));
   EXPECT_THAT(all, Not(HasSubstr("CPU or RAM")));
 }
 
-TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
-  start({}, {.only_three_writes = true});
+class SlowWeb : public Live {
+ protected:
+  void write_and_set_back(const sim::NetBoxQuirks& quirks);
+};
+
+void SlowWeb::write_and_set_back(const sim::NetBoxQuirks& quirks) {
+  start({}, quirks);
   const kphi::test::TemporaryFolder folder;
   const std::filesystem::path journal = folder / "journal";
   for (int round = 0; round < 3; ++round) {
