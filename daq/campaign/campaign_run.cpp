@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "base/error.hpp"
 #include "daq/campaign/at_the_stand.hpp"
@@ -333,7 +334,9 @@ class CampaignRun {
                                       : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg));
     const Answered answered(progress_);
     return ask_at_the_stand(bench_, person_, stop_asked_, [&](const std::string& condition) {
-      return person_.confirm_mounting(campaign_.propeller, occlusion_deg, condition);
+      const bool first = !std::exchange(has_asked_, true);
+      return person_.confirm_mounting(campaign_.propeller, occlusion_deg,
+                                      condition + (first ? about_keypad(bench_) : ""));
     });
   }
 
@@ -416,6 +419,7 @@ class CampaignRun {
   Instant accepted_at_{0};            ///< the last of them
   std::optional<double> last_run_s_;  ///< bench time of the last run, where steps end by themselves
   std::optional<MountConfirmation> mounted_;
+  bool has_asked_ = false;         ///< for a mounting
   std::set<std::string> refused_;  ///< what this computer did not grant; the operator was told
   CampaignResult result_;
 };

@@ -71,6 +71,7 @@ void ModbusSupply::describe() {
   identity_.model = model_->name;
   identity_.device = fmt::format("supply {} on {}", model_->name, address_.where());
   identity_.off = off_word(address_, map, identity_.device);
+  identity_.locks_keypad = map.locks_keypad;
   if (map.serial != kAbsent) {
     const auto at = static_cast<std::size_t>(map.serial);
     identity_.serial = fmt::format("{:08}", static_cast<std::uint32_t>(registers_[at]) << 16 | registers_[at + 1]);

@@ -127,6 +127,27 @@ TEST(Program, SwitchesTheSupplyOnToAskTheModuleAtItsUsersWordAlone) {
   EXPECT_EQ(account.last_speed_at(), -1) << "and nothing turns";
 }
 
+TEST(Program, SaysAtTheFirstMountingThatTheKeysOfTheSupplySwitchNothing) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  write(bench.path("short.yaml"), short_campaign_text("0, 45", 1, 2));
+  Terminal terminal;
+  Process run(
+      {kphi(), "run", bench.path("short.yaml"), "--bench", bench.path("bench.yaml"), "--out", bench.path("results")},
+      {}, {{}, terminal.descriptor(), 0});
+  const auto said = [&] {
+    const std::string words = "keypad is locked while kphi asks it";
+    const std::size_t at = run.err().find(words);
+    return at == std::string::npos ? 0 : run.err().find(words, at + 1) == std::string::npos ? 1 : 2;
+  };
+  run.wait_for_prompt();
+  EXPECT_EQ(said(), 1) << run.err();
+  terminal.type("0");
+  run.wait_for_prompt();
+  EXPECT_EQ(said(), 1) << "not at the second";
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << run.err();
+}
+
 TEST(Program, ThatIsEndedWhileItAsksTheModuleLeavesNoPowerOn) {
   Manner manner;
   manner.supply = true;
