@@ -90,6 +90,9 @@ extern "C" {
 
 int flock(int file, int operation) { return answer("lock", path_of(file), "flock", file, operation); }
 int chmod(const char* path, mode_t mode) noexcept { return answer("mode", absolute(path), "chmod", path, mode); }
+int fchmodat(int folder, const char* path, mode_t mode, int flags) noexcept {
+  return answer("mode", absolute(path), "fchmodat", folder, path, mode, flags);
+}
 int fchmod(int file, mode_t mode) noexcept { return answer("mode", path_of(file), "fchmod", file, mode); }
 int fdatasync(int file) { return answer("sync", path_of(file), "fdatasync", file); }
 int fsync(int file) { return answer(is_folder(file) ? "folder-sync" : "sync", path_of(file), "fsync", file); }
