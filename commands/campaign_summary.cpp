@@ -70,10 +70,7 @@ CampaignSummary summary_of(const results::CampaignFolder& folder) {
           [&](const fs::path& file) { summary.origin = name_of(profiles::load_bench(file.string()).origin()); });
   look_at(folder.campaign_file(), summary, [&](const fs::path& file) { take_campaign(file, summary); });
   look_at(folder.steps(), summary, [&](const fs::path& file) {
-    for (const results::StepMean& step : results::read_steps(file)) {
-      ++summary.steps;
-      summary.flagged += step.quality_flags != 0 ? 1 : 0;
-    }
+    for (const results::StepMean& step : results::read_steps(file)) summary.steps.add(step.quality_flags);
   });
   look_at(folder.coefficients(), summary, [&](const fs::path& file) { take_coefficients(file, summary); });
   if (summary.started_utc.empty()) summary.runs = folder.complete_runs().size();
@@ -92,7 +89,7 @@ std::string CampaignSummary::coefficient() const {
 std::string CampaignSummary::next() const {
   if (!damage.empty()) return "kphi verify " + folder;
   if (!finished && !started_utc.empty()) return "kphi run --bench BENCH --resume " + folder;
-  if (steps == 0) return "kphi replay " + folder;
+  if (steps.steps == 0) return "kphi replay " + folder;
   return K_T ? "" : "kphi fit " + folder;
 }
 
@@ -100,7 +97,10 @@ Json to_json(const CampaignSummary& summary) {
   const auto number = [](const std::optional<double>& value) { return value ? Json(*value) : Json(); };
   Json json;
   KPHI_JSON_MEMBERS(json, summary, folder, origin, started_utc, campaign, propeller, operator_name, runs, planned,
-                    steps, flagged, not_needed, finished, safety_stop, verdict, damage);
+                    not_needed, finished, safety_stop, verdict, damage);
+  json["steps"] = summary.steps.steps;
+  json["flagged"] = summary.steps.flagged;
+  json["flags"] = results::flag_counts(summary.steps);
   json["K_T"] = number(summary.K_T);
   json["expanded_95"] = number(summary.expanded_95);
   json["next"] = summary.next();
@@ -118,8 +118,8 @@ std::string to_text(const CampaignSummary& summary) {
   line("campaign", summary.campaign);
   line("propeller", summary.propeller);
   line("runs", summary.progress() + (summary.finished || summary.started_utc.empty() ? "" : ", not finished"));
-  if (summary.steps > 0)
-    line("steps", fmt::format("{}, {} of them flagged", summary.steps, summary.flagged) +
+  if (summary.steps.steps > 0)
+    line("steps", results::in_words(summary.steps) +
                       (summary.not_needed > 0 ? fmt::format("; {} not needed", summary.not_needed) : ""));
   line("safety stop", summary.safety_stop);
   line("K_T", summary.coefficient() + (summary.K_T ? " N/(rad/s)^2" : ""));

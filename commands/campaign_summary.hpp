@@ -7,6 +7,7 @@
 
 #include "commands/commands.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/steps_csv.hpp"
 
 namespace kphi::commands {
 
@@ -14,10 +15,10 @@ struct CampaignSummary {
   std::string folder;
   std::string started_utc;  ///< of the journal's first entry; empty: no journal
   std::string campaign, propeller, operator_name;
-  std::string origin = "unknown";      ///< or measured, simulated
-  std::size_t runs = 0, planned = 0;   ///< accepted; 0 planned: unknown
-  std::size_t steps = 0, flagged = 0;  ///< of steps.csv
-  std::size_t not_needed = 0;          ///< steps that runs left out because k was certain enough
+  std::string origin = "unknown";     ///< or measured, simulated
+  std::size_t runs = 0, planned = 0;  ///< accepted; 0 planned: unknown
+  results::FlaggedSteps steps{};      ///< of steps.csv
+  std::size_t not_needed = 0;         ///< steps that runs left out because k was certain enough
   bool finished = false;
   std::string safety_stop;                 ///< its reason; empty: none, or resumed since
   std::optional<double> K_T, expanded_95;  ///< N/(rad/s)²; nullopt: not fitted

@@ -168,8 +168,8 @@ std::string readme_of(const CampaignSummary& summary) {
             "propeller spins through a profile of speeds over occlusions of known angle phi"
           : "a propeller spins through a profile of speeds over occlusions of known angle phi, a six-axis\n"
             "load cell measures the force",
-      summary.flagged, summary.steps, summary.coefficient(), summary.verdict.empty() ? "not fitted" : summary.verdict,
-      kMetadata, kChecksums);
+      summary.steps.flagged, summary.steps.steps, summary.coefficient(),
+      summary.verdict.empty() ? "not fitted" : summary.verdict, kMetadata, kChecksums);
 }
 
 /// A zip that is written as a whole by close(), or not at all.

@@ -353,9 +353,12 @@ CampaignVerification verify_campaign(const CampaignFolder& folder) {
   }
   std::vector<std::filesystem::path> runs = folder.complete_runs();
   for (const auto& path : folder.reference_runs()) runs.push_back(path);
+  if (const auto writable = std::ranges::count_if(runs, is_writable); writable > 0)
+    found.remarks.push_back(
+        fmt::format("{}: {} of {} runs are writable; run chmod a-w on them, if this disk knows that",
+                    folder.runs().string(), writable, runs.size()));
   for (const auto& path : runs) {
     ++found.runs;
-    if (is_writable(path)) found.remarks.push_back(path.string() + ": writable; run chmod a-w on it");
     for (const std::string& problem : verify_run(path).problems) found.problems.push_back(with_file(path, problem));
     if (!digests.contains("runs/" + path.filename().string()))
       found.problems.push_back(path.string() + ": not in the journal");

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -46,17 +47,36 @@ void FileLayer::sync_data(int descriptor) {
   if (::fdatasync(descriptor) != 0) fail("fdatasync");
 }
 
-void FileLayer::sync_folder(const std::filesystem::path& folder) {
+bool FileLayer::sync_folder(const std::filesystem::path& folder) {
   const Descriptor fd = opened(folder, O_RDONLY | O_DIRECTORY, "open folder");
-  if (::fsync(fd.number()) != 0) fail("fsync folder");
+  if (::fsync(fd.number()) == 0) return true;
+  if (!is_unknown_there(errno)) fail("fsync folder");
+  return false;
+}
+
+bool FileLayer::make_read_only(const std::filesystem::path& file) {
+  struct stat now {};
+  if (::stat(file.c_str(), &now) != 0) fail("stat");
+  constexpr mode_t kWrite = S_IWUSR | S_IWGRP | S_IWOTH;
+  if (::chmod(file.c_str(), now.st_mode & 07777 & ~kWrite) != 0) {
+    if (!is_unknown_there(errno)) fail("chmod");
+    return false;
+  }
+  return ::stat(file.c_str(), &now) == 0 && (now.st_mode & kWrite) == 0;  // some say yes, and do nothing
 }
 
 void FileLayer::rename(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
   if (errno != EINVAL && errno != ENOSYS) fail("rename");
   // File systems without RENAME_NOREPLACE: a hard link is as strict.
-  if (::link(from.c_str(), to.c_str()) != 0) fail("link");
-  if (::unlink(from.c_str()) != 0) fail("unlink");
+  if (::link(from.c_str(), to.c_str()) == 0) {
+    if (::unlink(from.c_str()) != 0) fail("unlink");
+    return;
+  }
+  if (!is_unknown_there(errno)) fail("link");
+  // Nor links: nobody else writes into the folder, whose lock kphi has.
+  if (std::filesystem::exists(to)) throw std::system_error(EEXIST, std::generic_category(), "rename");
+  replace(from, to);
 }
 
 void FileLayer::replace(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -70,7 +90,11 @@ std::uint64_t FileLayer::free_bytes(const std::filesystem::path& folder) {
 }
 
 void MemoryOnlySync::sync_data(int) {}
-void MemoryOnlySync::sync_folder(const std::filesystem::path&) {}
+bool MemoryOnlySync::sync_folder(const std::filesystem::path&) { return true; }
+
+bool is_unknown_there(int error) noexcept {
+  return error == EPERM || error == EINVAL || error == ENOSYS || error == EOPNOTSUPP;
+}
 
 FileLayer& disk() {
   static FileLayer layer;

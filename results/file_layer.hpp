@@ -25,8 +25,10 @@ class FileLayer {
   virtual void reserve(int descriptor, std::uint64_t offset, std::uint64_t bytes);
   /// fdatasync.
   virtual void sync_data(int descriptor);
-  /// fsync of the folder: makes new and renamed files in it durable.
-  virtual void sync_folder(const std::filesystem::path& folder);
+  /// fsync of the folder: makes new and renamed files in it durable. False: this file system knows no such thing.
+  virtual bool sync_folder(const std::filesystem::path& folder);
+  /// Takes everybody's right to write. False: this file system keeps no such rights.
+  virtual bool make_read_only(const std::filesystem::path& file);
   /// Throws EEXIST if `to` exists.
   virtual void rename(const std::filesystem::path& from, const std::filesystem::path& to);
   /// Replaces `to` atomically.
@@ -39,7 +41,7 @@ class FileLayer {
 class MemoryOnlySync final : public FileLayer {
  public:
   void sync_data(int descriptor) override;
-  void sync_folder(const std::filesystem::path& folder) override;
+  bool sync_folder(const std::filesystem::path& folder) override;
 };
 
 /// The one FileLayer of the process.
@@ -76,6 +78,9 @@ void require_room(const std::filesystem::path& folder, std::uint64_t bytes, File
 
 /// Writes all of `text`. Throws std::system_error.
 void write_all(int descriptor, std::string_view text);
+
+/// What a file system answers to an order that it does not know: exFAT, CIFS, FUSE. Not of a disk that fails.
+[[nodiscard]] bool is_unknown_there(int error) noexcept;
 
 /// Syncs a closed file. Throws std::system_error.
 void sync_file(const std::filesystem::path& path, FileLayer& files);

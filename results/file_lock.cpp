@@ -92,14 +92,14 @@ std::optional<FileLock> FileLock::take(const std::filesystem::path& path, LockHo
     const int fd = file.number();
     if (fd < 0) throw RecordError(failure_text(path.string(), errno));
     if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
-      if (knows_no_locks(errno)) return FileLock(path, std::move(file));
+      if (knows_no_locks(errno)) return FileLock(path, std::move(file), false);
       holder = read_holder(fd);
       return std::nullopt;
     }
     if (!is_still_at(fd, path)) continue;
     const std::string words = own_words();
     if (::ftruncate(fd, 0) == 0) (void)!::pwrite(fd, words.data(), words.size(), 0);
-    return FileLock(path, std::move(file));
+    return FileLock(path, std::move(file), true);
   }
 }
 

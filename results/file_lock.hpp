@@ -23,17 +23,21 @@ struct LockHolder {
 class FileLock {
  public:
   /// Takes the lock at `path`, also in another user's file. nullopt: taken; `holder` names the other program. On a file
-  /// system without locks it always succeeds. Throws RecordError if the file cannot be opened.
+  /// system without locks, one that does not hold(). Throws RecordError if the file cannot be opened.
   [[nodiscard]] static std::optional<FileLock> take(const std::filesystem::path& path, LockHolder& holder);
+  /// False: this file system gives no locks, and another program could have it, too.
+  [[nodiscard]] bool holds() const noexcept { return holds_; }
   FileLock(FileLock&&) = default;
   FileLock& operator=(FileLock&&) = delete;
   /// Removes the file, then releases the lock.
   ~FileLock();
 
  private:
-  FileLock(std::filesystem::path path, Descriptor file) : path_(std::move(path)), file_(std::move(file)) {}
+  FileLock(std::filesystem::path path, Descriptor file, bool holds)
+      : path_(std::move(path)), file_(std::move(file)), holds_(holds) {}
   std::filesystem::path path_;
   Descriptor file_;
+  bool holds_;
 };
 
 }  // namespace kphi::results

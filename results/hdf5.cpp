@@ -6,9 +6,13 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
+#include <cerrno>
 #include <cstring>
+#include <functional>
 #include <system_error>
+#include <utility>
 
 #include "base/error.hpp"
 #include "results/checked_heap.hpp"
@@ -48,11 +52,12 @@ Cause take_cause() {
   return cause;
 }
 
-[[noreturn]] void fail(const std::string& doing) {
-  const Cause cause = take_cause();
+[[noreturn]] void fail(const Cause& cause, const std::string& doing) {
   if (cause.error != 0) throw RecordError(failure_text(doing, cause.error));
   throw RecordError(fmt::format("{}: HDF5: {}", doing, cause.text.empty() ? "refused" : cause.text));
 }
+
+[[noreturn]] void fail(const std::string& doing) { fail(take_cause(), doing); }
 
 Handle fixed_text(std::size_t size) {
   Handle type = own(H5Tcopy(H5T_C_S1), "text type");
@@ -187,13 +192,37 @@ Handle own(hid_t id, const std::string& doing) {
   return Handle(id);
 }
 
+namespace {
+
+/// Without the library's lock on a file system that gives none: kphi has its own on the folder. Once without, always:
+/// the library compares it with that of a file that is open.
+std::atomic<bool> without_locks{false};
+
+Handle with_lock_if_possible(const Handle& access, const std::string& doing, const std::function<hid_t()>& open) {
+  const auto lock = [&](bool wanted) { check(H5Pset_file_locking(access.get(), wanted, true), doing); };
+  lock(!without_locks);
+  hid_t file = open();
+  if (file < 0 && !without_locks) {
+    const Cause cause = take_cause();
+    if (cause.error != ENOLCK && !is_unknown_there(cause.error)) fail(cause, doing);
+    without_locks = true;
+    lock(false);
+    file = open();
+  }
+  return own(file, doing);
+}
+
+}  // namespace
+
 Handle create_file(const std::filesystem::path& path) {
   be_quiet();
   const Handle list = creation_list(H5P_FILE_CREATE, track_links);
   const Handle access = own(checked_access(), path.string());
   // 1.8: readable by every HDF5 since 2008, with checksums over its metadata.
   check(H5Pset_libver_bounds(access.get(), H5F_LIBVER_V18, H5F_LIBVER_V18), path.string());
-  return own(H5Fcreate(path.c_str(), H5F_ACC_EXCL, list.get(), access.get()), path.string() + ": create");
+  return with_lock_if_possible(access, path.string() + ": create", [&, flags = H5F_ACC_EXCL]() mutable {
+    return H5Fcreate(path.c_str(), std::exchange(flags, H5F_ACC_TRUNC), list.get(), access.get());
+  });
 }
 
 Handle open_file(const std::filesystem::path& path) {
@@ -203,7 +232,12 @@ Handle open_file(const std::filesystem::path& path) {
   if (std::filesystem::exists(path, none) && !std::filesystem::is_regular_file(path, none))
     throw RecordError(path.string() + ": open: this is a folder, a pipe or a device; name a run file");
   const Handle access = own(checked_access(), path.string() + ": open");
-  return own(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), path.string() + ": open");
+  // What is finished nobody writes any more.
+  const bool is_finished = path.extension() != ".part";
+  if (is_finished) check(H5Pset_file_locking(access.get(), false, true), path.string() + ": open");
+  const auto open = [&] { return H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()); };
+  const std::string doing = path.string() + ": open";
+  return is_finished ? own(open(), doing) : with_lock_if_possible(access, doing, open);
 }
 
 Handle create_group(const Handle& parent, const char* name) {

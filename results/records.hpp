@@ -59,7 +59,8 @@ struct LoadCellScale {
   std::uint32_t saturation_bits = 1u << 17;
   std::string serial;             ///< of the calibration
   std::string configuration_xml;  ///< verbatim
-  std::string slots_json;         ///< pages of all slots, verbatim: {"netftapi2.xml?index=0": "<?xml …", …}
+  std::string
+      slots_json;  ///< page of the calibration, verbatim: {"netftcalapi.xml?index=0": "<?xml …"}; older files: of all
 };
 
 /// Everything about a run that is known before the motor turns.

@@ -276,9 +276,7 @@ RunDigests RunWriter::finish(const RunEnding& ending, const Views& views) {
   const std::filesystem::path target =
       ending.outcome == Outcome::complete ? final_path_ : free_name(without_ending(final_path_) + ".aborted", ".h5");
   on_disk(target.string(), [&] {
-    using std::filesystem::perms;
-    std::filesystem::permissions(path_, perms::owner_write | perms::group_write | perms::others_write,
-                                 std::filesystem::perm_options::remove);
+    (void)files_.make_read_only(path_);
     files_.rename(path_, target);
     path_ = target;
     files_.sync_folder(target.parent_path());

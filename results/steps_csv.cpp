@@ -265,6 +265,38 @@ std::string quality_flag_names(std::uint32_t flags) { return joined(flags, &Flag
 
 std::string quality_flags_in_words(std::uint32_t flags) { return joined(flags, &FlagText::words, ", "); }
 
+void FlaggedSteps::add(std::uint32_t flags) noexcept {
+  ++steps;
+  flagged += flags != 0;
+  for (std::size_t bit = 0; bit < by_bit.size(); ++bit) by_bit[bit] += static_cast<int>(flags >> bit & 1u);
+}
+
+std::string in_words(const FlaggedSteps& steps) {
+  constexpr std::size_t kMost = 4;
+  std::string words = fmt::format("{} of {} steps flagged", steps.flagged, steps.steps);
+  if (steps.flagged == 0) return words;
+  std::vector<std::size_t> bits;
+  std::uint32_t all = 0;
+  for (std::size_t bit = 0; bit < steps.by_bit.size(); ++bit) {
+    if (steps.by_bit[bit] == 0) continue;
+    bits.push_back(bit);
+    all |= 1u << bit;
+  }
+  std::ranges::stable_sort(bits, std::greater<>(), [&](std::size_t bit) { return steps.by_bit[bit]; });
+  std::vector<std::string> named;
+  for (std::size_t i = 0; i < std::min(bits.size(), kMost); ++i)
+    named.push_back(fmt::format("{} {}", kFlagTexts[bits[i]].words, steps.by_bit[bits[i]]));
+  if (bits.size() > kMost) named.push_back(fmt::format("{} more", bits.size() - kMost));
+  return words + fmt::format(" ({}{})", fmt::join(named, ", "), (all & ~kHarmlessFlags) == 0 ? "; none spoils k" : "");
+}
+
+std::map<std::string, int> flag_counts(const FlaggedSteps& steps) {
+  std::map<std::string, int> counts;
+  for (std::size_t bit = 0; bit < steps.by_bit.size(); ++bit)
+    if (steps.by_bit[bit] > 0) counts[std::string(kFlagTexts[bit].name)] = steps.by_bit[bit];
+  return counts;
+}
+
 std::uint32_t quality_flags_from_names(std::string_view names) {
   std::uint32_t flags = 0;
   while (!names.empty()) {

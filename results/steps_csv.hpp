@@ -3,9 +3,11 @@
 // air density, uncertainties) follow in groups, each present if one of the steps has it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +22,17 @@ namespace kphi::results {
 [[nodiscard]] std::string quality_flag_names(std::uint32_t flags);
 /// The same for a person: "commanded speed not reached, motor derated".
 [[nodiscard]] std::string quality_flags_in_words(std::uint32_t flags);
+/// How many steps are flagged, and how often by which flag.
+struct FlaggedSteps {
+  int steps = 0, flagged = 0;
+  std::array<int, 32> by_bit{};  ///< of QualityFlag
+  void add(std::uint32_t flags) noexcept;
+};
+/// "3 of 3 steps flagged (thrust never settled 3, supply sagged 1)": the most frequent first, four at most; whether
+/// none of them spoils k.
+[[nodiscard]] std::string in_words(const FlaggedSteps& steps);
+/// By the names of steps.csv, without those that no step has.
+[[nodiscard]] std::map<std::string, int> flag_counts(const FlaggedSteps& steps);
 /// Inverse of quality_flag_names(). Throws std::invalid_argument naming the unknown word.
 [[nodiscard]] std::uint32_t quality_flags_from_names(std::string_view names);
 

@@ -41,7 +41,7 @@ kphi sim bench.yaml >sim.log 2>&1 &
 sim=$!
 trap 'kill $sim' EXIT
 until kphi sim bench.yaml --status >/dev/null 2>&1; do sleep 0.2; done
-kphi devices --bench bench.yaml --wake-ups 0 | head -3
+kphi devices --bench bench.yaml | head -3
 kphi run campaign.yaml --bench bench.yaml --yes >folder 2>run.log || { tail run.log; exit 1; }
 kphi fit "$(cat folder)"
 kphi list

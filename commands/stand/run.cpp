@@ -53,11 +53,16 @@ std::unique_ptr<Operator> person(const RunOptions& options, const std::optional<
 }
 
 void summarise(const CampaignResult& result, const std::string& folder, bool json) {
-  const nlohmann::json all{{"folder", folder},    {"runs", result.runs},   {"samples", result.samples},
-                           {"lost", result.lost}, {"steps", result.steps}, {"flagged_steps", result.flagged_steps}};
+  const nlohmann::json all{{"folder", folder},
+                           {"runs", result.runs},
+                           {"samples", result.samples},
+                           {"lost", result.lost},
+                           {"steps", result.steps.steps},
+                           {"flagged_steps", result.steps.flagged},
+                           {"flags", results::flag_counts(result.steps)}};
   put(stdout, (json ? all.dump() : folder) + "\n");
-  put(stderr, fmt::format("{} runs, {} samples, {} lost, {} of {} steps flagged\nnext: kphi fit {}\n", result.runs,
-                          result.samples, result.lost, result.flagged_steps, result.steps, folder));
+  put(stderr, fmt::format("{} runs, {} samples, {} lost, {}\nnext: kphi fit {}\n", result.runs, result.samples,
+                          result.lost, results::in_words(result.steps), folder));
 }
 
 profiles::Campaign campaign_of(const RunOptions& options) {
@@ -68,6 +73,11 @@ profiles::Campaign campaign_of(const RunOptions& options) {
   if (!std::filesystem::exists(file))
     throw ConfigurationError(options.resume + ": no campaign.yaml in this folder; give a campaign file");
   return profiles::load_campaign(file.string());
+}
+
+/// Where files will be made, or the parent of it.
+std::filesystem::path folder_of(const RunOptions& options) {
+  return options.resume.empty() ? options.out : options.resume;
 }
 
 /// The campaign's folder, and how far it is.
@@ -131,15 +141,18 @@ struct RunRequest {
 ExitCode print_plan(const RunRequest& request) {
   announce_origin(request.config);
   const auto& [options, campaign, config, answers] = request;
-  const DryRun dry = dry_run(campaign, config, options.out, answers);
+  const DryRun dry = dry_run(campaign, config, folder_of(options), answers);
   fmt::print("{}", options.json ? to_json(dry, campaign, config).dump() + "\n" : to_text(dry, campaign, config));
   return dry.ok() ? ExitCode::ok : ExitCode::usage;
 }
 
-/// What no later check would say before the first device turns or the folder is made.
-void require_possible(const DryRun& dry) {
+/// What no later check would say before the first device turns or the folder is made. Of a resumed campaign, what its
+/// disk refuses.
+void require_possible(const DryRun& dry, bool resumed) {
+  for (const Finding& finding : dry.files)
+    if (finding.severity == Severity::fault) throw ConfigurationError(finding.words());
   for (const PlanCheck& check : dry.checks)
-    if (check.finding.severity == Severity::fault)
+    if (!resumed && check.finding.severity == Severity::fault)
       throw ConfigurationError(check.subject + ": " + check.finding.words());
 }
 
@@ -152,8 +165,8 @@ void announce(const RunRequest& request, const DryRun& dry) {
 }
 
 /// Connects, checks devices and disk, makes the folder, and runs what is left of the campaign.
-CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination,
-                       Operator& person, live::LiveSession& view, const std::function<bool()>& stop_asked) {
+void execute(const RunRequest& request, const profiles::Plan& plan, Destination& destination, Operator& person,
+             live::LiveSession& view, const std::function<bool()>& stop_asked) {
   const SoFar known = so_far(request.campaign, request.options.wishes);
   const RunOptions& options = request.options;
   const profiles::Campaign& campaign = request.campaign;
@@ -161,17 +174,21 @@ CampaignResult execute(const RunRequest& request, const profiles::Plan& plan, De
   const auto devices = lock_devices(lock_names(config));
   if (!destination.folder) std::filesystem::create_directories(options.out);
   const auto bench = connect_awake(config, stop_asked);
-  const std::vector<BenchFinding> findings =
-      audit_bench(*bench, campaign, config);  // faults throw before a folder is made
-  const auto bytes = static_cast<std::uint64_t>(
-      destination.share_left(plan) * static_cast<double>(bytes_needed(longest_plan(campaign, config), config)));
-  results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes, bench->files());
-  if (!destination.folder) destination.create(options, campaign, *bench);
-  PrintedProgress printed(stderr, has_terminal());
-  const auto progress = view.beside(printed, bench->clock());
-  return view.tell_the_end([&] {
-    return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
-                        destination.resumption ? &*destination.resumption : nullptr, &findings, known);
+  leave_without_power(*bench, [&] {
+    const std::vector<BenchFinding> findings =
+        audit_bench(*bench, campaign, config);  // faults throw before a folder is made
+    const auto bytes = static_cast<std::uint64_t>(
+        destination.share_left(plan) * static_cast<double>(bytes_needed(longest_plan(campaign, config), config)));
+    results::require_room(destination.folder ? destination.folder->path().string() : options.out, bytes,
+                          bench->files());
+    if (!destination.folder) destination.create(options, campaign, *bench);
+    PrintedProgress printed(stderr, has_terminal());
+    const auto progress = view.beside(printed, bench->clock());
+    const CampaignResult result = view.tell_the_end([&] {
+      return run_campaign(*bench, campaign, config, *destination.folder, person, *progress, stop_asked,
+                          destination.resumption ? &*destination.resumption : nullptr, &findings, known);
+    });
+    summarise(result, destination.folder->path().string(), options.json);
   });
 }
 
@@ -182,11 +199,11 @@ ExitCode run(const RunOptions& options) {
   if (options.dry_run) return print_plan(request);
   const auto& [unused, campaign, config, answers] = request;
   profiles::require_within(campaign, config);
-  const DryRun dry = dry_run(campaign, config, options.out, answers);
   Destination destination;
   if (!options.resume.empty()) destination.open(options, campaign, config);
   if (destination.finished) return print_finished(destination, options.json);
-  if (!destination.resumption) require_possible(dry);
+  const DryRun dry = dry_run(campaign, config, folder_of(options), answers);
+  require_possible(dry, destination.resumption.has_value());
   // A resumption asks only for the missing runs: the operator reports missing answers.
   if (answers && !destination.resumption) profiles::require_mountings(*answers, dry.plan);
   const SignalWatch signals;  // before the words that promise it
@@ -200,8 +217,7 @@ ExitCode run(const RunOptions& options) {
   clear_safety_stop(destination, *operator_, answers);
   if (const auto doubts = profiles::doubts_of(campaign); !doubts.empty() && !destination.resumption)
     operator_->accept_doubts(fmt::format("{}", fmt::join(doubts, "\n")));
-  const CampaignResult result = execute(request, dry.plan, destination, *operator_, view, stop_asked);
-  summarise(result, destination.folder->path().string(), options.json);
+  execute(request, dry.plan, destination, *operator_, view, stop_asked);
   operator_->finish();
   return ExitCode::ok;
 }

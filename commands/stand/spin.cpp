@@ -11,6 +11,7 @@
 #include "commands/inputs.hpp"
 #include "daq/audit/bench_audit.hpp"
 #include "daq/guard/cell_trust.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "results/reduction/reduction.hpp"
@@ -133,24 +134,27 @@ ExitCode spin(const SpinOptions& options) {
   const auto person = person_of(options, terminal, end_asked);
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
-  if (!options.campaign.empty()) bench->mounted(campaign.propeller.id, 0);
-  const HandControl::Settings speeds = speeds_of(options, top, bench->clock());
-  for (const BenchFinding& found : audit_bench(*bench, campaign, config))
-    if (found.finding.severity != Severity::note) put(stderr, found.line() + "\n");
-  announce_origin(config);
-  put(stderr, live_greeting(view));
-  put(stderr,
-      fmt::format("keys: ↑ + faster, ↓ - slower by {:.0f} RPM, Enter or h holds, any other stops{}\n", options.step_rpm,
-                  speeds.lasts ? "" : fmt::format("; without a key it stops after {:g} s", options.dead_man_s)));
-  PrintedProgress printed(stderr, has_terminal(), &describe_by_hand);
-  const auto progress = view.beside(printed, bench->clock());
-  KeysAtTheStand keys(terminal, view);
-  const SpinResult result = view.tell_the_end([&] {
-    return spin_by_hand(
-        {*bench, campaign, config, *person, *progress, stop_asked, speeds, keys, file_of(options, *bench)});
+  leave_without_power(*bench, [&] {
+    if (!options.campaign.empty()) bench->mounted(campaign.propeller.id, 0);
+    const HandControl::Settings speeds = speeds_of(options, top, bench->clock());
+    for (const BenchFinding& found : audit_bench(*bench, campaign, config))
+      if (found.finding.severity != Severity::note) put(stderr, found.line() + "\n");
+    announce_origin(config);
+    put(stderr, live_greeting(view));
+    put(stderr,
+        fmt::format("keys: ↑ + faster, ↓ - slower by {:.0f} RPM, Enter or h holds, any other stops{}\n",
+                    options.step_rpm,
+                    speeds.lasts ? "" : fmt::format("; without a key it stops after {:g} s", options.dead_man_s)));
+    PrintedProgress printed(stderr, has_terminal(), &describe_by_hand);
+    const auto progress = view.beside(printed, bench->clock());
+    KeysAtTheStand keys(terminal, view);
+    const SpinResult result = view.tell_the_end([&] {
+      return spin_by_hand(
+          {*bench, campaign, config, *person, *progress, stop_asked, speeds, keys, file_of(options, *bench)});
+    });
+    terminal.end_keys();
+    summarise(result, config, options.json);
   });
-  terminal.end_keys();
-  summarise(result, config, options.json);
   return ExitCode::ok;
 }
 

@@ -9,6 +9,7 @@
 #include "commands/at_the_bench.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "daq/guard/interlock.hpp"
 #include "daq/guard/run_stopped.hpp"
 #include "daq/hardware/device_locks.hpp"
 #include "results/file_layer.hpp"
@@ -141,36 +142,38 @@ ExitCode weigh(const WeighOptions& options) {
   };
   const auto devices = lock_devices(lock_names(config));
   const auto bench = connect_awake(config, stop_asked);
-  announce_origin(config);
-  put(stderr, live_greeting(view));
-  PrintedProgress printed(stderr, has_terminal(), &describe_weighing);
-  const auto progress = view.beside(printed, bench->clock());
-  KeysAtTheStand keys(terminal, view);
-  if (!options.yes) keys.begin();
-  const Weigh order{*bench,
-                    *progress,
-                    stop_asked,
-                    options.yes ? nullptr : &keys,
-                    order_of(options, config),
-                    options.times,
-                    from_seconds(options.seconds),
-                    [&] {
-                      if (SignalWatch::take_suspension()) terminal.suspend();
-                    }};
-  std::string file, in_short;
-  results::CellCheck check;
-  const results::Weighing weighing = view.tell_the_end(
-      [&] {
-        results::Weighing done = daq::weigh(order);
-        file = keep(done, options, *bench).string();
-        check = check_of(done);
-        const auto lines = words_of(done, check, done.axis == config.thrust_axis, options.gravity.has_value());
-        for (const std::string& line : lines) progress->say(line);
-        in_short = "The cell " + results::gain_words(done, check) + ".";
-        return done;
-      },
-      in_short);
-  put(stdout, (options.json ? json_of(weighing, check, file).dump() : file) + "\n");
+  leave_without_power(*bench, [&] {
+    announce_origin(config);
+    put(stderr, live_greeting(view));
+    PrintedProgress printed(stderr, has_terminal(), &describe_weighing);
+    const auto progress = view.beside(printed, bench->clock());
+    KeysAtTheStand keys(terminal, view);
+    if (!options.yes) keys.begin();
+    const Weigh order{*bench,
+                      *progress,
+                      stop_asked,
+                      options.yes ? nullptr : &keys,
+                      order_of(options, config),
+                      options.times,
+                      from_seconds(options.seconds),
+                      [&] {
+                        if (SignalWatch::take_suspension()) terminal.suspend();
+                      }};
+    std::string file, in_short;
+    results::CellCheck check;
+    const results::Weighing weighing = view.tell_the_end(
+        [&] {
+          results::Weighing done = daq::weigh(order);
+          file = keep(done, options, *bench).string();
+          check = check_of(done);
+          const auto lines = words_of(done, check, done.axis == config.thrust_axis, options.gravity.has_value());
+          for (const std::string& line : lines) progress->say(line);
+          in_short = "The cell " + results::gain_words(done, check) + ".";
+          return done;
+        },
+        in_short);
+    put(stdout, (options.json ? json_of(weighing, check, file).dump() : file) + "\n");
+  });
   return ExitCode::ok;
 }
 

@@ -49,6 +49,10 @@ class SupplyLink {
   virtual std::size_t take(std::span<SupplyReading> out) = 0;
   /// Why the link failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
+  /// Nobody can switch it off by its keys while it is asked.
+  [[nodiscard]] virtual bool locks_keypad() const { return false; }
+  /// Bench time that the longest reading so far took; 0: unknown, or none to speak of. Thread-safe.
+  [[nodiscard]] virtual Duration longest_reading() const noexcept { return Duration(0); }
   /// Output off. Thread-safe; does not wait.
   virtual void cut() noexcept = 0;
   /// Output off, and waits until the supply confirms it. Returns why it may still be on; empty: it is off.

@@ -13,28 +13,20 @@
 namespace kphi::daq {
 namespace {
 
-constexpr int kSlots = 16;
-
 const char* unit_of(std::size_t axis) { return axis < 3 ? "N" : "N m"; }
 
 }  // namespace
 
-SlotPages read_slot_pages(const PageReader& page) {
-  SlotPages read;
-  nlohmann::ordered_json pages;
-  for (const char* name : {"netftapi2.xml", "netftcalapi.xml"}) {
-    for (int slot = 0; slot < kSlots; ++slot) {
-      const std::string target = fmt::format("{}?index={}", name, slot);
-      pages[target] = nullptr;
-      if (!read.findings.empty()) continue;
-      try {
-        pages[target] = page("/" + target);
-      } catch (const DeviceError& error) {
-        read.findings.push_back({Severity::warning,
-                                 fmt::format("could not read all slots of the box: {}", error.what()),
-                                 "the runs will lack the settings of some slots; check the box: `kphi devices`"});
-      }
-    }
+CalibrationPage read_calibration_page(const PageReader& page, int calibration) {
+  CalibrationPage read;
+  const std::string target = fmt::format("netftcalapi.xml?index={}", calibration);
+  nlohmann::json pages{{target, nullptr}};
+  try {
+    pages[target] = page("/" + target);
+  } catch (const DeviceError& error) {
+    read.findings.push_back({Severity::warning,
+                             fmt::format("could not read the page of the calibration: {}", error.what()),
+                             "the runs will lack it; check the box: `kphi devices`"});
   }
   read.json = pages.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return read;

@@ -15,16 +15,16 @@
 
 namespace kphi::daq {
 
-/// Body of one page of the box's web server, "/netftapi2.xml?index=3". Throws DeviceError.
+/// Body of one page of the box's web server, "/netftapi2.xml". Throws DeviceError.
 using PageReader = std::function<std::string(const std::string& target)>;
 
-struct SlotPages {
-  std::string json;  ///< {"netftapi2.xml?index=0": "<?xml …", …}; null for a page that was not read
+struct CalibrationPage {
+  std::string json;  ///< {"netftcalapi.xml?index=0": "<?xml …"}; null for a page that was not read
   std::vector<Finding> findings;
 };
 
-/// Reads the 32 pages, up to the first failure.
-[[nodiscard]] SlotPages read_slot_pages(const PageReader& page);
+/// Of the calibration in use.
+[[nodiscard]] CalibrationPage read_calibration_page(const PageReader& page, int calibration);
 
 /// `biased`: the box's own bias was taken in between; its gage bias does not count as a change.
 [[nodiscard]] netbox::Changes changes_since(const netbox::Configuration& before, const netbox::Configuration& after,

@@ -15,6 +15,11 @@ std::string StandAtRest::condition() const {
                     : "The rotor is at rest and the supply's output is off.";
 }
 
+std::string about_keypad(Bench& bench) {
+  if (bench.supply() == nullptr || !bench.supply()->locks_keypad()) return "";
+  return " The supply's keypad is locked while kphi asks it: your switch for the 12 V is another one.";
+}
+
 MountConfirmation ask_at_the_stand(Bench& bench, Operator& person, const std::function<bool()>& stop_asked,
                                    const std::function<MountConfirmation(const std::string& condition)>& ask) {
   const StandAtRest stand(bench, stop_asked);

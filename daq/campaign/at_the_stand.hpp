@@ -27,6 +27,9 @@ class StandAtRest {
   bool has_power_ = true;
 };
 
+/// For a person who comes near for the first time: that the supply's keys switch nothing; empty: they may.
+[[nodiscard]] std::string about_keypad(Bench& bench);
+
 /// Asks while the stand is at rest. `ask` gets the sentence of its condition. Throws SafetyStop, Interrupted, and what
 /// `ask` throws.
 [[nodiscard]] MountConfirmation ask_at_the_stand(

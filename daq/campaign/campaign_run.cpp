@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "base/error.hpp"
 #include "daq/campaign/at_the_stand.hpp"
@@ -333,7 +334,9 @@ class CampaignRun {
                                       : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg));
     const Answered answered(progress_);
     return ask_at_the_stand(bench_, person_, stop_asked_, [&](const std::string& condition) {
-      return person_.confirm_mounting(campaign_.propeller, occlusion_deg, condition);
+      const bool first = !std::exchange(has_asked_, true);
+      return person_.confirm_mounting(campaign_.propeller, occlusion_deg,
+                                      condition + (first ? about_keypad(bench_) : ""));
     });
   }
 
@@ -359,27 +362,28 @@ class CampaignRun {
     note(results::kRunAccepted, accepted);
     const auto [means, zero] = reduce_with_zeros(recording);
     review_.add(run.file.filename().string(), means);
-    const int flagged = count(run.file, recording, means);
+    const results::FlaggedSteps flagged = count(run.file, recording, means);
     review_.write(folder_, bench_.files());
     for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {} of {} steps flagged{}{}", result_.runs,
-                              planned_, run.file.filename().string(), run.account.received, lost, flagged, means.size(),
+    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {}{}{}", result_.runs, planned_,
+                              run.file.filename().string(), run.account.received, lost, results::in_words(flagged),
                               run.steps_not_needed > 0 ? fmt::format(", {} not needed", run.steps_not_needed) : "",
                               rest_words(run.stop)));
     if (!so_far_ || planned.is_reference()) return;
     if (const std::string words = so_far_(review_.steps()); !words.empty()) progress_.reached(words);
   }
 
-  /// Returns how many of its steps are flagged.
-  int count(const std::filesystem::path& file, const results::RunRecording& run,
-            const std::vector<results::StepMean>& means) {
-    int flagged = 0;
-    for (const auto& step : means) flagged += step.quality_flags != 0;
+  /// Returns the flags of its steps.
+  results::FlaggedSteps count(const std::filesystem::path& file, const results::RunRecording& run,
+                              const std::vector<results::StepMean>& means) {
+    results::FlaggedSteps flagged;
+    for (const auto& step : means) {
+      flagged.add(step.quality_flags);
+      result_.steps.add(step.quality_flags);
+    }
     ++result_.runs;
     result_.samples += run.account.received;
     result_.lost += run.account.lost_network + run.account.lost_host;
-    result_.steps += static_cast<int>(means.size());
-    result_.flagged_steps += flagged;
     accepted_.insert(file.filename().string());
     return flagged;
   }
@@ -415,6 +419,7 @@ class CampaignRun {
   Instant accepted_at_{0};            ///< the last of them
   std::optional<double> last_run_s_;  ///< bench time of the last run, where steps end by themselves
   std::optional<MountConfirmation> mounted_;
+  bool has_asked_ = false;         ///< for a mounting
   std::set<std::string> refused_;  ///< what this computer did not grant; the operator was told
   CampaignResult result_;
 };

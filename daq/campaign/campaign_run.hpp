@@ -15,6 +15,7 @@
 #include "profiles/campaign.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/step_mean.hpp"
+#include "results/steps_csv.hpp"
 
 namespace kphi::daq {
 
@@ -34,8 +35,7 @@ struct CampaignResult {
   int runs = 0;  ///< all accepted ones, those from before a resumption included
   std::uint64_t samples = 0;
   std::uint64_t lost = 0;  ///< in the network and in this host
-  int steps = 0;
-  int flagged_steps = 0;
+  results::FlaggedSteps steps{};
 };
 
 /// One line on what the steps so far tell, or none; called after each accepted run, by the runner's thread, while the

@@ -1,7 +1,6 @@
 #include "daq/campaign/dry_run.hpp"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +11,7 @@
 #include "base/number.hpp"
 #include "drivers/netbox/receive/audit.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/disk_trial.hpp"
 #include "results/reduction/bin_statistics.hpp"
 #include "results/reduction/quality_flags.hpp"
 #include "results/run_writer.hpp"
@@ -161,10 +161,10 @@ class Checks {
     add(Severity::note, "disk", words);
   }
 
-  void writable(const std::filesystem::path& folder) {
-    const bool may = std::filesystem::is_directory(folder) && access(folder.c_str(), W_OK | X_OK) == 0;
-    if (may) return add(Severity::note, "files", folder.string() + " is writable");
-    add(Severity::fault, "files", folder.string() + " is not writable", "choose another folder with --out");
+  void files(const std::filesystem::path& folder, const std::vector<Finding>& found) {
+    for (const Finding& finding : found) add(finding.severity, "files", finding.what, finding.next_move);
+    if (found.empty())
+      add(Severity::note, "files", fmt::format("tried in {}: create, lock, sync, rename, read-only", folder.string()));
   }
 
   void answers(const profiles::Answers& answers, const profiles::Plan& plan) {
@@ -295,7 +295,11 @@ DryRun dry_run(const Campaign& campaign, const profiles::BenchConfig& config, co
   checks.braking(dry.plan);
   checks.coil();
   checks.disk(dry.bytes_needed, dry.bytes_free, folder);
-  checks.writable(folder);
+  dry.files = results::try_disk(folder, files);
+  // On another disk.
+  if (const auto runs = folder / "runs"; std::filesystem::is_symlink(runs))
+    for (Finding& finding : results::try_disk(runs, files)) dry.files.push_back(std::move(finding));
+  checks.files(folder, dry.files);
   if (answers) checks.answers(*answers, dry.plan);
   dry.checks = checks.take();
   dry.limits = combine_limits(campaign, config);

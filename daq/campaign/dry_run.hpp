@@ -29,6 +29,7 @@ struct PlanCheck {
 struct DryRun {
   profiles::Plan plan;
   std::vector<PlanCheck> checks;
+  std::vector<Finding> files;      ///< of the disk, as tried; among the checks, too
   std::vector<GuardLimit> limits;  ///< the guard's, without those of the devices
   std::uint64_t bytes_needed = 0;
   std::uint64_t bytes_free = 0;
@@ -41,7 +42,8 @@ struct DryRun {
 /// Bytes on disk that the runs of a plan take, with a margin.
 [[nodiscard]] std::uint64_t bytes_needed(const profiles::Plan& plan, const profiles::BenchConfig& config);
 
-/// Touches no device. `out`: the folder for results, which need not exist. `answers`: if scripted.
+/// Touches no device; tries the disk (results/disk_trial.hpp). `out`: the folder for results, which need not exist.
+/// `answers`: if scripted.
 [[nodiscard]] DryRun dry_run(const profiles::Campaign& campaign, const profiles::BenchConfig& config,
                              const std::filesystem::path& out, const std::optional<profiles::Answers>& answers,
                              results::FileLayer& files = results::disk());

@@ -10,7 +10,7 @@
 namespace kphi::daq {
 namespace {
 
-constexpr double kSupplyPatience = 2;    // s; the supply is read eight times per second
+constexpr double kSupplyPatience = 2;    // s; the supply is read eight times per second, or as fast as it answers
 constexpr double kLongestPause = 0.4;    // s; the driver coasts the motor after 0.5 s
 constexpr double kRecorderPause = 5;     // s; what arrives meanwhile waits in memory, for at most 10 s
 constexpr double kMeterOfSupply = 1.02;  // a supply that limits its current shows a little more than its limit
@@ -70,18 +70,31 @@ void offer_devices(Table& table, const DeviceLimits& devices) {
 }
 
 /// Limits that neither a file nor a device sets.
-void offer_own(Table& table, const profiles::BenchConfig& config) {
+/// A slow supply's reading is that old when the next one is there.
+double patience_with_supply(const DeviceLimits* devices) {
+  return std::max(kSupplyPatience, 1 + 2 * (devices != nullptr ? devices->supply_reading_s : 0));
+}
+
+void offer_own(Table& table, const profiles::BenchConfig& config, const DeviceLimits* devices) {
   offer(table, Watched::speed_error, 100 * SpeedWatch::kShare, "kphi");
   offer(table, Watched::load_cell_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
   offer(table, Watched::motor_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");
-  if (config.supply) offer(table, Watched::supply_age, kSupplyPatience, "kphi");
+  const double patience_s = patience_with_supply(devices);
+  if (config.supply)
+    offer(table, Watched::supply_age, patience_s,
+          patience_s > kSupplyPatience ? fmt::format("kphi; a reading takes {:.1f} s", devices->supply_reading_s)
+                                       : "kphi");
   offer(table, Watched::pause, kLongestPause, "kphi, while the motor turns");
   offer(table, Watched::recorder_pause, kRecorderPause, "kphi, while the motor turns");
 }
 
 }  // namespace
 
-DeviceLimits device_limits(Bench& bench) { return {bench.load_cell().scale().range, bench.motor().parameters()}; }
+DeviceLimits device_limits(Bench& bench) {
+  const SupplyLink* const supply = bench.supply();
+  const Duration reading = supply != nullptr ? supply->longest_reading() : Duration(0);
+  return {bench.load_cell().scale().range, bench.motor().parameters(), to_seconds(bench.clock().shrunk(reading))};
+}
 
 DeviceLimits device_limits(const results::RunHeader& header) {
   return {header.load_cell.range, iq::AuditRecord::of(header.motor_parameters)};
@@ -94,7 +107,7 @@ std::vector<GuardLimit> combine_limits(const profiles::Campaign& campaign, const
   offer_file(table, "bench", config.limits);
   offer_bench(table, config);
   if (devices != nullptr) offer_devices(table, *devices);
-  offer_own(table, config);
+  offer_own(table, config, devices);
   std::vector<GuardLimit> limits;
   for (const auto& [watched, limit] : table)
     if (config.supply || row_of(watched).source != Source::supply) limits.push_back(limit);

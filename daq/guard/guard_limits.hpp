@@ -72,7 +72,7 @@ inline constexpr const char* kCheckRotor = "check for a blocked rotor, a loose p
 inline constexpr const char* kCheckShort = "check for a blocked rotor and a short circuit";
 inline constexpr const char* kCheckVoltage = "check the supply, its leads and its limits";
 inline constexpr const char* kCheckComputer =
-    "close other programs, do not stop kphi with Ctrl-Z; `kphi devices` shows how late this computer is";
+    "close other programs, do not stop kphi with Ctrl-Z; `kphi devices --timing` shows how late this computer is";
 inline constexpr const char* kCheckBox = "check the box's power and network cable: `kphi devices`";
 
 inline constexpr double kOvershoot = 1.05;  ///< a closed loop overshoots a little on every step
@@ -172,6 +172,7 @@ void to_json(Json& json, const GuardLimit& limit) {
 struct DeviceLimits {
   std::array<double, 6> load_cell_range{};  ///< N and N m; 0: unknown
   iq::AuditRecord motor;
+  double supply_reading_s = 0;  ///< what the longest reading of the supply took, wall time; 0: unknown
 };
 
 /// Of a connected bench.

@@ -109,8 +109,45 @@ std::optional<Trip> check(const SupplyReading& seen, const profiles::SupplyConfi
   return std::nullopt;
 }
 
-MotorPower::MotorPower(SupplyLink* supply, const StopAsked& stop_asked)
-    : supply_(supply), on_(supply != nullptr ? std::make_unique<OutputEnable>(*supply, stop_asked) : nullptr) {}
+void rethrow_without_power(SupplyLink* supply) {
+  const auto cause = std::current_exception();
+  StopWords words = words_of(cause);
+  if (supply != nullptr && words.state.empty()) words.leaves(supply->switch_off());
+  try {
+    std::rethrow_exception(cause);
+  } catch (const SafetyStop& stop) {
+    throw words.state == stop.words().state ? stop : SafetyStop(words);
+  } catch (const Interrupted&) {
+    throw Interrupted(words);
+  } catch (const Error& error) {
+    if (words.state.empty()) throw;
+    throw RunStopped(words, error.exit_code());
+  } catch (const std::exception&) {
+    if (words.state.empty()) throw;
+    throw RunStopped(words, ExitCode::failure);
+  }
+}
+
+void leave_without_power(Bench& bench, const std::function<void()>& work) {
+  try {
+    work();
+  } catch (...) {
+    rethrow_without_power(bench.supply());
+  }
+  (void)bench.switch_off_power();
+}
+
+MotorPower::MotorPower(SupplyLink* supply, const StopAsked& stop_asked) : supply_(supply) {
+  if (supply_ != nullptr) switch_on(stop_asked);
+}
+
+void MotorPower::switch_on(const StopAsked& stop_asked) {
+  try {
+    on_ = std::make_unique<OutputEnable>(*supply_, stop_asked);
+  } catch (...) {
+    rethrow_without_power(supply_);
+  }
+}
 
 bool MotorPower::off(MotorLink& motor) {
   if (supply_ == nullptr) return false;
@@ -126,7 +163,7 @@ void MotorPower::restore(MotorLink& motor, const Clock& clock, const StopAsked& 
   require_awake(clock);
   require_no_stop(stop_asked, "before the motor had power");
   if (supply_ != nullptr) {
-    on_ = std::make_unique<OutputEnable>(*supply_, stop_asked);
+    switch_on(stop_asked);
     wait_for_voltage();
   }
   if (supply_ != nullptr || !motor.failure().empty()) motor.wake(stop_asked);

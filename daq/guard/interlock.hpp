@@ -76,6 +76,15 @@ void require_awake(const Clock& clock);
 /// speed has `settled`, constant current, sag and rise, which a change of speed may bring. nullopt: no trip.
 [[nodiscard]] std::optional<Trip> check(const SupplyReading& seen, const profiles::SupplyConfig& wanted, bool settled);
 
+/// In a handler: switches the output off, and throws again what is handled. If the supply does not confirm it, what is
+/// thrown says so: an Interrupted or SafetyStop stays one, another error becomes a RunStopped with its exit code.
+/// nullptr: throws it again as it is.
+[[noreturn]] void rethrow_without_power(SupplyLink* supply);
+
+/// Runs `work`, then switches the motor's power off for good, also when `work` throws. The motor must be at rest by
+/// then. Throws SafetyStop for a supply that does not confirm it, and as rethrow_without_power.
+void leave_without_power(Bench& bench, const std::function<void()>& work);
+
 /// Power of a bench's motor: on when this is made and until it is destroyed, except from off() to restore(). One
 /// thread.
 class MotorPower {
@@ -91,6 +100,8 @@ class MotorPower {
       const std::function<void()>& wait_for_voltage = [] {});
 
  private:
+  void switch_on(const StopAsked& stop_asked);
+
   SupplyLink* supply_;
   std::unique_ptr<OutputEnable> on_;
 };

@@ -251,12 +251,11 @@ LiveLoadCell::LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, co
       throw DeviceError("Net Box " + config_.host, "compare its scale", finding->what, finding->next_move);
     findings_.push_back(std::move(*finding));
   }
-  SlotPages slots = read_slot_pages([&](const std::string& target) {
-    require_no_stop(stop_asked, kBeforePower);
-    return page_of(config_, target);
-  });
-  slots_json_ = std::move(slots.json);
-  findings_.insert(findings_.end(), slots.findings.begin(), slots.findings.end());
+  require_no_stop(stop_asked, kBeforePower);
+  CalibrationPage page = read_calibration_page([&](const std::string& target) { return page_of(config_, target); },
+                                               cell_->configuration().calibration);
+  slots_json_ = std::move(page.json);
+  findings_.insert(findings_.end(), page.findings.begin(), page.findings.end());
 }
 
 results::LoadCellScale LiveLoadCell::start() {
@@ -284,7 +283,7 @@ std::string LiveLoadCell::failure() const {
 }
 
 ModulePower::ModulePower(const profiles::BenchConfig& config, const Clock& clock, const StopAsked& stop_asked)
-    : supply_(*config.supply, clock), sentinel_(last_words_of_supply(config, supply_)), on_(supply_, stop_asked) {}
+    : supply_(*config.supply, clock), sentinel_(last_words_of_supply(config, supply_)), on_(&supply_, stop_asked) {}
 
 LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bool()>& stop_asked)
     : config_(config),
@@ -295,9 +294,20 @@ LiveBench::LiveBench(const profiles::BenchConfig& config, const std::function<bo
       supply_(config.supply ? std::make_unique<LiveSupply>(*config.supply, clock_) : nullptr),
       sentinel_(last_words(config, supply_.get())),
       power_(supply_to_switch_on(stop_asked), stop_asked),
-      motor_(config.motor ? connect_motor(config, clock_)
-                          : std::make_unique<LiveMotor>(config.iq, clock_, stop_asked)) {
-  require_no_stop(stop_asked, kWhileConnecting);
+      motor_(connect_motor_with_power(stop_asked)) {}
+
+std::unique_ptr<MotorLink> LiveBench::connect_motor_with_power(const StopAsked& stop_asked) {
+  try {
+    std::unique_ptr<MotorLink> motor;
+    if (config_.motor)
+      motor = connect_motor(config_, clock_);
+    else
+      motor = std::make_unique<LiveMotor>(config_.iq, clock_, stop_asked);
+    require_no_stop(stop_asked, kWhileConnecting);
+    return motor;
+  } catch (...) {
+    rethrow_without_power(supply_.get());
+  }
 }
 
 SupplyLink* LiveBench::supply_to_switch_on(const std::function<bool()>& stop_asked) {

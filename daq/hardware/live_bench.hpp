@@ -57,8 +57,8 @@ class LiveMotor final : public MotorLink {
 class LiveLoadCell final : public LoadCellLink {
  public:
   /// Applies the settings of the bench file, reads the configuration, checks it against the one over TCP, reads the
-  /// pages of all slots. The destructor, or the next program, restores the box's settings. `stop_asked` is checked
-  /// before each page. Throws DeviceError, Interrupted.
+  /// page of its calibration. The destructor, or the next program, restores the box's settings. Throws DeviceError,
+  /// Interrupted.
   LiveLoadCell(profiles::NetBoxConfig config, const Clock& clock, const std::function<bool()>& stop_asked);
   [[nodiscard]] results::LoadCellScale scale() const override { return to_scale(cell_->configuration()); }
   [[nodiscard]] const netbox::Configuration* box() const override { return &cell_->configuration(); }
@@ -94,7 +94,7 @@ class ModulePower {
  private:
   LiveSupply supply_;
   Sentinel sentinel_;
-  OutputEnable on_;
+  MotorPower on_;
 };
 
 class LiveBench final : public Bench {
@@ -126,6 +126,8 @@ class LiveBench final : public Bench {
   void tell_simulation(const std::string& line);
   /// The last check before its output comes on. Throws Interrupted, SafetyStop.
   [[nodiscard]] SupplyLink* supply_to_switch_on(const std::function<bool()>& stop_asked);
+  /// Of whatever kind. What it throws says, too, if its supply has not confirmed that it is off again.
+  [[nodiscard]] std::unique_ptr<MotorLink> connect_motor_with_power(const StopAsked& stop_asked);
 
   profiles::BenchConfig config_;
   SteadyClock clock_;

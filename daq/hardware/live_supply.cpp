@@ -38,7 +38,7 @@ std::string summary(const supply::Identity& identity) {
 }
 
 LiveSupply::LiveSupply(const profiles::SupplyConfig& config, const Clock& clock)
-    : config_(config), worker_(open_supply(config, clock), clock, looks_per_second(config)) {}
+    : config_(config), clock_(clock), worker_(open_supply(config, clock), clock, looks_per_second(config)) {}
 
 std::string LiveSupply::identity() const { return summary(worker_.identity()); }
 
@@ -48,18 +48,24 @@ void LiveSupply::switch_on(const StopAsked& stop_asked) {
   });
   require_no_stop(stop_asked, "before the supply was switched on");
   worker_.switch_on();
-  const auto give_up = std::chrono::steady_clock::now() + kRise;
+  const Instant on_at = clock_.now();
+  const auto begun = std::chrono::steady_clock::now();
   const double enough = (1 - results::kSupplySag) * config_.voltage.value();
-  for (std::optional<SupplyReading> seen;; std::this_thread::sleep_for(kAsk)) {
-    seen = worker_.newest();
+  for (;; std::this_thread::sleep_for(kAsk)) {
+    const std::optional<SupplyReading> seen = worker_.newest();
     require_no_stop(stop_asked, "while the supply was switched on");
     if (seen && seen->output && seen->voltage_v >= enough) return;
     if (!worker_.alive()) throw DeviceError(worker_.identity().device, "switch on", worker_.failure());
-    if (std::chrono::steady_clock::now() < give_up) continue;
-    throw DeviceError(
-        worker_.identity().device, "switch on",
-        fmt::format("{:.4g} V at the terminals, {:g} V set", seen ? seen->voltage_v : 0.0, config_.voltage.value()),
-        "check for a short circuit, or a current limit that is too low");
+    // A reading under way is from before, and a slow supply takes as long again for the next.
+    const Duration wall = std::chrono::steady_clock::now() - begun;
+    if (wall < kRise + 3 * clock_.shrunk(worker_.longest_look())) continue;
+    if (!seen || Instant(seen->time_ns) < on_at)
+      throw DeviceError(worker_.identity().device, "switch on",
+                        fmt::format("its voltage was not read within {:.1f} s", to_seconds(wall)),
+                        "close other programs that ask it; look at its display");
+    throw DeviceError(worker_.identity().device, "switch on",
+                      fmt::format("{:.4g} V at the terminals, {:g} V set", seen->voltage_v, config_.voltage.value()),
+                      "check for a short circuit, or a current limit that is too low");
   }
 }
 

@@ -27,7 +27,7 @@ DeviceAnswer answer_of(const std::string& device, Ask&& ask) {
   try {
     words = ask();
     answer.answers = true;
-    answer.lines.push_back(words);
+    answer.in_short = words;
   } catch (const DeviceError& error) {
     findings.push_back({Severity::fault, error.what(), ""});
   } catch (const std::invalid_argument& error) {
@@ -66,6 +66,9 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
                                     identity.voltage_max_v, identity.current_max_a, volts, amps),
                         "lower voltage_v and current_limit_a, or use a larger supply"});
   }
+  if (identity.locks_keypad)
+    findings.push_back({Severity::note, "its keypad is locked while kphi asks it: its output key is no switch for you",
+                        "have another switch for the 12 V within reach"});
   if (reading.protection != SupplyProtection::none) {
     findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(reading.protection)),
                         "find the cause; switching the output on clears it"});
@@ -80,14 +83,16 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
 
 }  // namespace
 
-bool has_fault(const std::vector<Finding>& findings) {
-  return std::ranges::find(findings, Severity::fault, &Finding::severity) != findings.end();
+void DeviceAnswer::add(const std::vector<Finding>& found) {
+  findings.insert(findings.end(), found.begin(), found.end());
+  put_worst_first(findings);
+  details["findings"] = findings;
 }
 
-void DeviceAnswer::add(const std::vector<Finding>& findings) {
-  has_fault = has_fault || daq::has_fault(findings);
-  for (const Finding& finding : findings) lines.push_back(finding.line());
-  details["findings"] = findings;
+std::optional<Severity> DeviceAnswer::worst() const {
+  if (wanted && !answers) return Severity::fault;
+  const auto found = std::ranges::max_element(findings, {}, &Finding::severity);
+  return found == findings.end() ? std::nullopt : std::optional(found->severity);
 }
 
 DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock) {
@@ -97,12 +102,18 @@ DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock
     const auto supply = open_supply(config, clock);
     const supply::Identity& identity = supply->identity();
     answer.answers = true;
-    answer.lines = {summary(identity)};
+    answer.in_short = summary(identity);
     answer.details = {{"model", identity.model}, {"serial", identity.serial}, {"firmware", identity.firmware}};
+    const Instant begun = clock.now();
     const SupplyReading seen = supply->read();
-    answer.lines.push_back(fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W; output {}",
-                                       seen.set_voltage_v, seen.current_limit_a, seen.voltage_v, seen.current_a,
-                                       seen.power_w(), seen.output ? "on" : "off"));
+    const double took_s = to_seconds(clock.shrunk(clock.now() - begun));
+    answer.in_short +=
+        fmt::format(", output {}, {:.4g} V, {:.3g} A", seen.output ? "on" : "off", seen.voltage_v, seen.current_a);
+    answer.lines = {
+        fmt::format("set to {:g} V, limit {:g} A; measures {:.4g} V, {:.3g} A, {:.3g} W", seen.set_voltage_v,
+                    seen.current_limit_a, seen.voltage_v, seen.current_a, seen.power_w()),
+        fmt::format("a reading takes {:.2g} s", took_s)};
+    answer.details["reading_s"] = took_s;
     KPHI_JSON_MEMBERS(answer.details, seen, voltage_v, current_a, set_voltage_v, current_limit_a);
     answer.details["output"] = seen.output != 0;
     findings = findings_of(identity, seen, config);
@@ -117,8 +128,7 @@ DeviceAnswer ask_sensor(const std::string& address) {
   DeviceAnswer answer = answer_of("ambient " + address, [&] { return air_of(address); });
   if (answer.answers)
     answer.lines.push_back(
-        "note: it must hang in the air that the propeller draws: a warm board beside it adds 3 to 7 °C, 1 to 2 % of k "
-        "in "
+        "it must hang in the air that the propeller draws: a warm board beside it adds 3 to 7 °C, 1 to 2 % of k in "
         "standard air; say how far it is to be trusted with ambient: {sensor: …, u_temperature_c: …}");
   return answer;
 }

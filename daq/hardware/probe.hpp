@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,16 +14,19 @@ namespace kphi::daq {
 struct DeviceAnswer {
   std::string device;  ///< as a bench file names it: "ambient usb:04d8:00dd:0001", "SCPI scpi-usb:1ab1:0e11"
   bool answers = false;
-  std::vector<std::string> lines{};  ///< for a person
+  std::string in_short{};              ///< what it is and shows
+  std::vector<std::string> lines{};    ///< all it says
+  std::vector<std::string> results{};  ///< of what was asked for besides
   nlohmann::ordered_json details{};
+  std::vector<Finding> findings{};
   bool wanted = true;  ///< named in the bench file
   std::string says{};  ///< instead of "answers"
-  bool has_fault = false;
 
-  void add(const std::vector<Finding>& findings);
+  /// Adds to the details, too.
+  void add(const std::vector<Finding>& found);
+  /// Of its worst finding; nullopt: none. One that is wanted and does not answer has a fault.
+  [[nodiscard]] std::optional<Severity> worst() const;
 };
-
-[[nodiscard]] bool has_fault(const std::vector<Finding>& findings);
 
 /// Throws ConfigurationError for an invalid URI.
 [[nodiscard]] DeviceAnswer ask_supply(const profiles::SupplyConfig& config, const Clock& clock);

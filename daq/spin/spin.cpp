@@ -45,9 +45,10 @@ std::shared_ptr<void> kept(std::shared_ptr<void> handle, const std::string& why_
 }  // namespace
 
 SpinResult spin_by_hand(const Spin& spin) {
-  const MountConfirmation clear = ask_at_the_stand(
-      spin.bench, spin.person, spin.stop_asked,
-      [&](const std::string& condition) { return spin.person.confirm_clear(to_rpm(spin.speeds.start), condition); });
+  const MountConfirmation clear =
+      ask_at_the_stand(spin.bench, spin.person, spin.stop_asked, [&](const std::string& condition) {
+        return spin.person.confirm_clear(to_rpm(spin.speeds.start), condition + about_keypad(spin.bench));
+      });
   HandControl steering(spin.speeds, spin.keys);
   const StopAsked stop_asked = [&] { return spin.stop_asked() || steering.is_called_off(); };
   spin.bench.restore_power(stop_asked);

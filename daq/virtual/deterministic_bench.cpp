@@ -112,9 +112,10 @@ void DeterministicBench::make_devices(const sim::BenchSettings& settings) {
   motor_->connect();
   read_box();
   cross_check();
-  SlotPages slots = read_slot_pages([this](const std::string& target) { return page(target); });
-  slots_json_ = std::move(slots.json);
-  findings_ = std::move(slots.findings);
+  CalibrationPage calibration =
+      read_calibration_page([this](const std::string& target) { return page(target); }, configuration_.calibration);
+  slots_json_ = std::move(calibration.json);
+  findings_ = std::move(calibration.findings);
 }
 
 void DeterministicBench::begin_run(const RunBeginning& run) {

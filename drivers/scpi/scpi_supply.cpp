@@ -19,6 +19,12 @@ constexpr double kMarginOfReading = 1.1;  // a supply shows a little more than i
 constexpr int kLongestQueue = 64;         // of errors; real ones hold 10 to 32
 constexpr double kStep = 0.001;           // V and A
 
+/// Some makers answer `0  No Error`, without the comma of SCPI-99 (21.8). nullopt: it begins with no number.
+std::optional<double> error_code(std::string_view error) {
+  error.remove_prefix(std::min(error.find_first_not_of(" \t"), error.size()));
+  return number_of(error.substr(0, error.find_first_of(", \t")));
+}
+
 void demand_range(const char* what, double value, double most) {
   if (std::isfinite(value) && value >= 0 && value <= most * kMarginOfReading) return;
   throw std::invalid_argument(fmt::format("{} {:g} is not within 0 to {:g}", what, value, most));
@@ -86,26 +92,39 @@ supply::Limits ScpiSupply::apply(const supply::Limits& limits) {
           Amperes(ask(std::string(dialect_->over_current) + "?"))};
 }
 
-SupplyReading ScpiSupply::read() {
+SupplyReading ScpiSupply::read(const std::function<void()>& between) {
   const Instant before = clock_.now();
   SupplyReading reading;
   reading.voltage_v = ask_within("MEAS:VOLT?", identity_.voltage_max_v);
+  between();
   reading.current_a = ask_within("MEAS:CURR?", identity_.current_max_a);
   const Instant after = clock_.now();
   reading.time_ns = (before + (after - before) / 2).count();
   reading.uncertainty_ns = ((after - before) / 2).count();
-  reading.set_voltage_v = ask_within("VOLT?", identity_.voltage_max_v);
-  reading.current_limit_a = ask_within("CURR?", identity_.current_max_a);
+  between();
   reading.output = ask("OUTP?") != 0;
+  between();
+  reading.set_voltage_v = ask_within("VOLT?", identity_.voltage_max_v);
+  between();
+  reading.current_limit_a = ask_within("CURR?", identity_.current_max_a);
+  between();
   if (tripped(dialect_->over_voltage_tripped)) reading.protection = SupplyProtection::over_voltage;
+  between();
   if (tripped(dialect_->over_current_tripped)) reading.protection = SupplyProtection::over_current;
+  between();
   reading.regulation = regulation();
   return reading;
 }
 
+/// The output's own state decides; the queue of errors only says why it does not obey.
 void ScpiSupply::switch_output(bool on) {
-  tell(on ? "OUTP ON" : kOff);
-  if ((ask("OUTP?") != 0) != on) fail("OUTP", on ? "the output stays off" : "the output stays on", "switch it by hand");
+  line_->write(on ? "OUTP ON" : kOff);
+  if ((ask("OUTP?") != 0) == on) return;
+  const std::string error = next_error();
+  fail("OUTP",
+       (on ? "the output stays off" : "the output stays on") +
+           (error.empty() ? "" : ": the instrument answers " + error),
+       "switch it by hand");
 }
 
 /// The oldest error in the instrument's queue, taken out of it; empty: none. Errors of the conversation (-400 to -499:
@@ -114,7 +133,7 @@ std::string ScpiSupply::next_error() {
   std::string error;
   for (int i = 0; i < kLongestQueue; ++i) {
     error = line_->query("SYST:ERR?");
-    const auto code = number_of(std::string_view(error).substr(0, error.find(',')));
+    const auto code = error_code(error);
     if (code && *code == 0) return {};
     if (!code || *code > -400 || *code < -499) break;
   }

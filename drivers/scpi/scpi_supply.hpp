@@ -20,7 +20,8 @@ class ScpiSupply final : public supply::Supply {
   [[nodiscard]] const supply::Identity& identity() const noexcept override { return identity_; }
   /// After each command the instrument's error queue is asked (SYST:ERR?).
   supply::Limits apply(const supply::Limits& limits) override;
-  [[nodiscard]] SupplyReading read() override;
+  using Supply::read;
+  [[nodiscard]] SupplyReading read(const std::function<void()>& between) override;
   void switch_off() override { switch_output(false); }
 
  private:

@@ -71,6 +71,7 @@ void ModbusSupply::describe() {
   identity_.model = model_->name;
   identity_.device = fmt::format("supply {} on {}", model_->name, address_.where());
   identity_.off = off_word(address_, map, identity_.device);
+  identity_.locks_keypad = map.locks_keypad;
   if (map.serial != kAbsent) {
     const auto at = static_cast<std::size_t>(map.serial);
     identity_.serial = fmt::format("{:08}", static_cast<std::uint32_t>(registers_[at]) << 16 | registers_[at + 1]);
@@ -84,16 +85,17 @@ void ModbusSupply::describe() {
   identity_.current_max_a = range().max_a;
 }
 
-SupplyReading ModbusSupply::read() {
+SupplyReading ModbusSupply::read(const std::function<void()>& between) {
   SupplyReading reading;
-  persist("read", [&] { return look(reading); });
+  persist("read", [&] { return look(reading, between); });
   return reading;
 }
 
-Outcome ModbusSupply::look(SupplyReading& reading) {
+Outcome ModbusSupply::look(SupplyReading& reading, const std::function<void()>& between) {
   const Instant before = clock_.now();
   for (const Block& block : model_->map->look) {
     if (block.count == 0) continue;
+    if (&block != model_->map->look.data()) between();
     if (Outcome outcome = link_.read(block, registers_); !outcome.ok()) return outcome;
   }
   const Instant after = clock_.now();

@@ -23,7 +23,8 @@ class ModbusSupply final : public Supply {
 
   [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
   Limits apply(const Limits& limits) override;
-  [[nodiscard]] SupplyReading read() override;
+  using Supply::read;
+  [[nodiscard]] SupplyReading read(const std::function<void()>& between) override;
   /// Sends the command at least once, even if the device does not answer.
   void switch_off() override;
 
@@ -34,7 +35,7 @@ class ModbusSupply final : public Supply {
   void identify();
   [[nodiscard]] const Model* ask_model(const RegisterMap& map, std::string& answers);
   void describe();
-  [[nodiscard]] Outcome look(SupplyReading& reading);
+  [[nodiscard]] Outcome look(SupplyReading& reading, const std::function<void()>& between);
   [[nodiscard]] std::string implausible(SupplyReading& reading) const;
   [[nodiscard]] const CurrentRange& range() const noexcept;
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,6 +33,7 @@ struct Identity {
   std::string firmware;                         ///< "1.28"; empty: unknown
   double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
   std::optional<LastWord> off{};                ///< switches its output off; nullopt: only this process can
+  bool locks_keypad = false;                    ///< while it is asked: its output key switches nothing
 };
 
 class PoweredOutput;
@@ -62,7 +64,11 @@ class Supply {
   /// Sets all four, thresholds first, reads back every readable one, and returns the settings as sent, rounded to the
   /// device's steps. Throws std::invalid_argument for a value that is negative, not finite, or beyond the maximum.
   virtual Limits apply(const Limits& limits) = 0;
-  [[nodiscard]] virtual SupplyReading read() = 0;
+  /// `between` is called before each question after the first, and may throw, to leave the reading.
+  [[nodiscard]] virtual SupplyReading read(const std::function<void()>& between) = 0;
+  [[nodiscard]] SupplyReading read() {
+    return read([] {});
+  }
   /// Returns when the device has reported that its output is off; also when it was off before.
   virtual void switch_off() = 0;
 

@@ -94,6 +94,7 @@ constexpr RegisterMap kRiden{
     .thresholds = {82, 2},
     .over_voltage = 82,
     .over_current = 83,
+    .locks_keypad = true,
 };
 
 // RuiDeng DPH5005 manual, p. 11.

@@ -81,6 +81,7 @@ struct RegisterMap {
   int current_range = kAbsent;
   Block thresholds;
   Writable over_voltage, over_current;
+  bool locks_keypad = false;  ///< while it is asked
 };
 
 /// Counts per ampere, and the largest setting, of one position of the current range.

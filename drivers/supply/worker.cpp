@@ -2,6 +2,7 @@
 
 #include <poll.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -136,8 +137,18 @@ std::string Worker::turn_off() noexcept {
   return why;
 }
 
+/// An order to switch off does not wait for the rest of a reading: slow supplies take seconds for one.
 void Worker::look() {
-  const SupplyReading reading = supply_->read();
+  const Instant begun = clock_.now();
+  SupplyReading reading;
+  try {
+    reading = supply_->read([this] {
+      if (stop_asked_ || offs_asked_ != offs_done_) throw Ordered{};
+    });
+  } catch (const Ordered&) {
+    return;
+  }
+  longest_look_ns_ = std::max(longest_look_ns_.load(), (clock_.now() - begun).count());
   queue_.push(reading);
   newest_.publish(reading);
 }

@@ -55,6 +55,8 @@ class Worker {
     const SupplyReading reading = newest_.read();
     return reading.time_ns == 0 ? std::nullopt : std::optional(reading);
   }
+  /// Bench time that the longest reading so far took; 0 before the first. Any thread.
+  [[nodiscard]] Duration longest_look() const noexcept { return Duration(longest_look_ns_); }
   /// Read at construction.
   [[nodiscard]] const Identity& identity() const noexcept { return identity_; }
   /// False once the supply has failed; stays false.
@@ -69,6 +71,8 @@ class Worker {
     std::string failure;  ///< empty: done
     bool unfit = false;   ///< by an invalid argument
   };
+  /// Leaves a reading.
+  struct Ordered {};
   struct Order {
     std::function<void()> act;
     std::promise<Answer> answer;
@@ -110,6 +114,7 @@ class Worker {
   Wakeup ordered_;
   std::atomic<std::uint64_t> offs_asked_{0}, offs_done_{0};
   std::atomic<bool> stop_asked_{false}, ended_{false};
+  std::atomic<std::int64_t> longest_look_ns_{0};
   Published<SupplyReading> newest_;
 
   boost::lockfree::spsc_queue<SupplyReading, boost::lockfree::capacity<4096>> queue_;

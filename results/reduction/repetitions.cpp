@@ -57,6 +57,7 @@ std::vector<RepetitionFigure> figures_of(const Runs& runs, const ZeroMovement& m
   for (const auto& [repetition, run] : runs) {
     const std::set<int> levels = good_levels(run);
     figures.push_back({.repetition = repetition, .usable = !levels.empty() && 2 * levels.size() >= run.size()});
+    for (const StepMean* step : run) figures.back().flags.add(step->quality_flags & ~kHarmlessFlags);
     if (!figures.back().usable) continue;
     if (!common) common = levels;
     std::erase_if(*common, [&](int level) { return !levels.contains(level); });
@@ -163,7 +164,8 @@ void decide(RepetitionVerdict& verdict, const RepetitionRule& rule) {
   std::vector<double> k;
   for (const RepetitionFigure& figure : verdict.repetitions) {
     if (!figure.usable) {
-      verdict.reason = fmt::format("repetition {} has too few unflagged steps", figure.repetition);
+      verdict.reason =
+          fmt::format("repetition {} has too few good steps: {}", figure.repetition, in_words(figure.flags));
     } else if (figure.outlying) {
       verdict.reason =
           fmt::format("repetition {} gives a k that is {:+.2f} % off the others ({})", figure.repetition,

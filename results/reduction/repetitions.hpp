@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "results/step_mean.hpp"
+#include "results/steps_csv.hpp"
 
 namespace kphi::results {
 
@@ -16,6 +17,7 @@ struct RepetitionFigure {
   double u = kNotMeasured;  ///< standard, from within the steps, the zeros and their drift
   double per_n = 0;         ///< change of k for 1 N of zero
   bool usable = false;      ///< at least half of its steps are good
+  FlaggedSteps flags{};     ///< that spoil k
   bool outlying = false;
   double away = kNotMeasured;  ///< k over the median of all (Student: mean of others), less 1
   /// Probability that chance alone puts one of all runs this far off; NaN: judged by Hampel's identifier, or not at

@@ -120,7 +120,7 @@ TEST_F(FirstSteps, AnOutputThatCannotBeIsRefusedBeforeAnythingHappens) {
   std::ofstream(folder_.path() / "afile") << "";
   const Answer run = say("run campaign.yaml --bench bench.yaml --yes --out afile");
   EXPECT_EQ(run.code, 2);
-  EXPECT_THAT(run.err, HasSubstr("afile is not writable; choose another folder with --out"));
+  EXPECT_THAT(run.err, HasSubstr("afile: no run can be kept here: Not a directory; choose another folder with --out"));
   const Answer sim = say("sim bench.yaml --truth nofolder/truth.yaml");
   EXPECT_EQ(sim.code, 2);
   EXPECT_THAT(sim.err, HasSubstr("the folder nofolder does not exist"));

@@ -324,12 +324,12 @@ TEST_F(FaultyCampaign, TakesTheBoxesBiasAsAMeasuredStepWhenTheCampaignSaysSo) {
   expect_whole();
 }
 
-TEST_F(FaultyCampaign, TakesNoBiasUnaskedAndKeepsThePagesOfAllSlotsAndTheHealthOfTheStream) {
+TEST_F(FaultyCampaign, TakesNoBiasUnaskedAndKeepsThePageOfTheCalibrationAndTheHealthOfTheStream) {
   (void)run("  []\n");
   EXPECT_EQ(recording(0).box_bias.records, 0u);
   EXPECT_EQ(recording(0).phases.at(0).phase, results::Phase::zero_before);
   const results::RunRecording run = recording(1);
-  EXPECT_THAT(run.header.load_cell.slots_json, AllOf(HasSubstr("netftapi2.xml?index=15"), HasSubstr("FT21001")));
+  EXPECT_THAT(run.header.load_cell.slots_json, AllOf(HasSubstr("netftcalapi.xml?index=0"), HasSubstr("FT21001")));
   EXPECT_NEAR(run.health.records_per_second, 7000, 1);
   EXPECT_NEAR(run.health.datagrams_per_second, 175, 1);
 }

@@ -42,9 +42,10 @@ class ModelDisk final : public results::FileLayer {
     ::close(fd);
     shared(status.st_ino)->bytes = std::move(bytes);
   }
-  void sync_folder(const std::filesystem::path& folder) override {
+  bool sync_folder(const std::filesystem::path& folder) override {
     next();
     durable_[folder.string()] = entries(folder);
+    return true;
   }
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override {
     next();

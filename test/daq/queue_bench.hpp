@@ -8,6 +8,7 @@
 
 #include "daq/bench/bench.hpp"
 #include "daq/bench/device_records.hpp"
+#include "daq/guard/run_stopped.hpp"
 
 namespace kphi::daq {
 
@@ -27,6 +28,7 @@ class QueueSupply final : public SupplyLink {
   [[nodiscard]] std::string identity() const override { return "test"; }
   std::size_t take(std::span<SupplyReading> out) override { return move_out(readings, out); }
   [[nodiscard]] std::string failure() const override { return {}; }
+  [[nodiscard]] bool locks_keypad() const override { return locks; }
   void cut() noexcept override { ++cuts; }
   [[nodiscard]] std::string switch_off() noexcept override {
     if (unconfirmed.empty()) on = false;
@@ -34,13 +36,16 @@ class QueueSupply final : public SupplyLink {
   }
   std::deque<SupplyReading> readings;
   int cuts = 0;
-  bool on = false, refuses = false;  ///< refuses: fails halfway through switch_on()
+  bool on = false;
+  bool refuses = false, interrupted = false;  ///< halfway through switch_on()
   std::string unconfirmed;
+  bool locks = false;  ///< its keypad
 
  private:
   void switch_on(const StopAsked&) override {
     on = true;
     if (refuses) throw std::runtime_error("no");
+    if (interrupted) throw Interrupted("stopped by request");
   }
 };
 

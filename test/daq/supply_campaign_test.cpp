@@ -47,7 +47,7 @@ class SupplyCampaign : public CampaignOnBench {
 TEST_F(SupplyCampaign, RecordsWhatTheSupplyShows) {
   const CampaignResult result = run();
   EXPECT_EQ(result.runs, 2);
-  EXPECT_EQ(result.flagged_steps, 0);
+  EXPECT_EQ(result.steps.flagged, 0);
   EXPECT_EQ(recording(0).header.supply_identity, "simulated supply");
   ASSERT_GT(recording(0).supply.size(), 8u);
   for (const auto& reading : recording(0).supply) {
@@ -98,7 +98,7 @@ TEST_F(SupplyCampaign, StopsWhenTheSupplyNoLongerAnswersAndSaysThatItMayBeOn) {
 
 TEST_F(SupplyCampaign, BearsAnAnswerThatIsLost) {
   in_step(1, [&] { spoil(sim::FaultKind::supply_bad_crc, 2); });
-  EXPECT_EQ(run().flagged_steps, 0);
+  EXPECT_EQ(run().steps.flagged, 0);
 }
 
 TEST_F(SupplyCampaign, CoastsWithinAFifthOfASecondOfTheReading) {

@@ -35,7 +35,7 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
                             "  - {at_s: 0, for_s: 100000, kind: foreign_source, p: 0.02}\n"
                             "  - {at_s: 0, for_s: 100000, kind: wrong_size, p: 0.02, size: 71}\n"
                             "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
-  const Ended devices = ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--json"});
+  const Ended devices = ran({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--json"});
   EXPECT_GT(json::parse(devices.out)[0]["stream"]["lost_network"], 0);
   const std::string folder = ran(bench.run_command()).folder();
   for (const char* verb : {"verify", "replay"}) (void)ran({kphi(), verb, folder});
@@ -75,14 +75,14 @@ TEST(FaultInjector, WhatARunSaysItLostIsWhatTheWireTookFromIt) {
 
 TEST(FaultInjector, NamesInLatin1ReachNoTerminalAsRawBytes) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 0, for_s: 100000, kind: http_charset}\n"});
-  const Ended devices = ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml")});
+  const Ended devices = ran({kphi(), "devices", "--details", "--bench", bench.path("bench.yaml")});
   EXPECT_THAT(devices.out, HasSubstr("Pr\uFFFDfstand"));
   EXPECT_THAT(devices.out + devices.err, Not(HasSubstr("\xFC")));
 }
 
 TEST(FaultInjector, ACellThatRepeatsOneValueIsNamedByDevicesAndRefusedByARun) {
   RunningBench bench(Manner{4, 7000, "  - {at_s: 0, kind: frozen, axes: 4}\n"});
-  const Ended devices = ran({kphi(), "devices", "--wake-ups", "0", "--bench", bench.path("bench.yaml")}, 1);
+  const Ended devices = ran({kphi(), "devices", "--bench", bench.path("bench.yaml")}, 1);
   EXPECT_THAT(devices.out, AllOf(HasSubstr("noise 0."), HasSubstr("Fz repeats one value in all "),
                                  Not(HasSubstr("Fx repeats one value"))));
   EXPECT_THAT(ran(bench.run_command(), 4).err, HasSubstr("Fz repeated one value in all"));

@@ -167,6 +167,17 @@ TEST(SignalAtTheStart, LetsNoPowerComeOnAndNoneStay) {
   }
 }
 
+TEST(SignalAtTheStart, TellsOfASupplyThatDoesNotConfirmThatItIsOffAgain) {
+  RunningBench bench(
+      Manner{.time_scale = 1, .faults = "  - {at_s: 0, for_s: 1000, kind: motor_mute}\n", .supply = true});
+  Process run(bench.run_command());
+  ASSERT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == true; })) << run.err();
+  (void)bench.fault("kind=supply_ignored_writes for_s=1000");
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << run.err();
+  EXPECT_NE(run.err().find("output NOT confirmed off, it may be ON"), std::string::npos) << run.err();
+}
+
 /// A shell that controls jobs, at a terminal.
 class Shell {
  public:
@@ -292,7 +303,7 @@ TEST_P(CtrlZWithPower, SwitchesItOffBeforeItStopsTheProgram) {
 }
 
 const Powered kPowered[] = {
-    {"devices", {"--switch-on", "--clock-gain", "20", "--wake-ups", "0"}},
+    {"devices", {"--switch-on", "--clock-gain", "20"}},
     {"weigh", {"--kg", "1", "--out", "out.d"}},
     {"spin", {"--rpm", "6000", "--out", "out.d"}},
     {"run", {"two.yaml", "--out", "out.d"}},

@@ -22,8 +22,8 @@ TEST(Locks, RefuseASecondProgramAndNameTheFirstWhichIsNotDisturbed) {
   Process first(bench.run_command());
   first.wait_for("step  2/4");
   const std::string holder = fmt::format("in use by process {} (", first.pid());
-  for (const auto& command : {bench.run_command(), std::vector<std::string>{kphi(), "devices", "--wake-ups", "0.1",
-                                                                            "--bench", bench.path("bench.yaml")}}) {
+  for (const auto& command :
+       {bench.run_command(), std::vector<std::string>{kphi(), "devices", "--bench", bench.path("bench.yaml")}}) {
     EXPECT_THAT(ran(command, 6).err, AllOf(HasSubstr(holder), HasSubstr(fmt::format("kill -INT {}", first.pid()))));
   }
   EXPECT_THAT(ran(resume_command(bench, folder_of(bench)), 6).err,

@@ -62,8 +62,8 @@ TEST(Program, NeedsNoControlLineOfASimulatorThatIsToldByHand) {
 
 TEST(Program, TellsWhoItsDevicesAreAndHowTheirClocksRun) {
   RunningBench bench;
-  const std::vector<std::string> command{
-      kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--json", "--clock-gain", "10"};
+  const std::vector<std::string> command{kphi(),   "devices",      "--bench", bench.path("bench.yaml"),
+                                         "--json", "--clock-gain", "10"};
   const json motor = json::parse(ran(command).out).at(1);
   EXPECT_EQ(motor.at("uid"), "002300064d4b501120343353");
   EXPECT_EQ(motor.at("firmware"), "speed 0.0.32");
@@ -79,20 +79,38 @@ TEST(Program, TellsThatAModuleCannotAnswerWhileTheSupplysOutputIsOff) {
   Manner manner;
   manner.supply = true;
   RunningBench bench(manner);
-  const std::vector<std::string> command{kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml")};
+  const std::vector<std::string> command{kphi(), "devices", "--bench", bench.path("bench.yaml")};
   const json answers = json::parse(ran(joined(command, {"--json"})).out);
   EXPECT_EQ(answers.at(1).at("output"), false);
   EXPECT_EQ(answers.at(2).at("answers"), false) << "its module, which is not missed then";
+  EXPECT_THAT(ran(command).out,
+              AllOf(HasSubstr("without power"), HasSubstr("give --switch-on to ask it"), Not(HasSubstr("FAULT"))));
   EXPECT_THAT(ran(joined(command, {"--clock-gain", "10"}), 3).out,
               HasSubstr("clock not measured: the supply's output is off"))
       << "unless its clock is asked for";
+}
+
+TEST(Program, TellsOfItsDevicesOnOneScreenWorstFirst) {
+  RunningBench bench(Manner{4, 3500, "  - {at_s: 0, kind: frozen, axes: 4}\n"});
+  const auto begun = std::chrono::steady_clock::now();
+  const Ended devices = ran({kphi(), "devices", "--bench", bench.path("bench.yaml")}, 1);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(9)) << "without the look at this computer";
+  EXPECT_THAT(devices.out, StartsWith("FAULT  Net Box 127.0.0.1: "));
+  const std::size_t fault = devices.out.find("fault: Fz repeats one value"),
+                    warning = devices.out.find("warning: 3500 Hz");
+  EXPECT_LT(fault, warning);
+  EXPECT_LT(warning, devices.out.find("ok     IQ module"));
+  EXPECT_LE(std::ranges::count(devices.out, '\n'), 24) << devices.out;
+  EXPECT_THAT(devices.out, Not(HasSubstr("this computer: late")));
+  EXPECT_THAT(ran({kphi(), "devices", "--timing", "0.2", "--details", "--bench", bench.path("bench.yaml")}, 1).out,
+              AllOf(HasSubstr("this computer: late by at most"), HasSubstr("receive buffer")));
 }
 
 TEST(Program, SwitchesTheSupplyOnToAskTheModuleAtItsUsersWordAlone) {
   Manner manner;
   manner.supply = true;
   RunningBench bench(manner);
-  const std::vector<std::string> command{kphi(), "devices", "--wake-ups", "0", "--bench", bench.path("bench.yaml")};
+  const std::vector<std::string> command{kphi(), "devices", "--bench", bench.path("bench.yaml")};
   EXPECT_THAT(ran(joined(command, {"--switch-on"})).out,
               AllOf(HasSubstr("firmware"), HasSubstr("the supply's output was on to ask it, and is off again")));
   EXPECT_EQ(bench.status()["supply"]["output"], false);
@@ -107,6 +125,27 @@ TEST(Program, SwitchesTheSupplyOnToAskTheModuleAtItsUsersWordAlone) {
   }
   const Account account = bench.account();
   EXPECT_EQ(account.last_speed_at(), -1) << "and nothing turns";
+}
+
+TEST(Program, SaysAtTheFirstMountingThatTheKeysOfTheSupplySwitchNothing) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  write(bench.path("short.yaml"), short_campaign_text("0, 45", 1, 2));
+  Terminal terminal;
+  Process run(
+      {kphi(), "run", bench.path("short.yaml"), "--bench", bench.path("bench.yaml"), "--out", bench.path("results")},
+      {}, {{}, terminal.descriptor(), 0});
+  const auto said = [&] {
+    const std::string words = "keypad is locked while kphi asks it";
+    const std::size_t at = run.err().find(words);
+    return at == std::string::npos ? 0 : run.err().find(words, at + 1) == std::string::npos ? 1 : 2;
+  };
+  run.wait_for_prompt();
+  EXPECT_EQ(said(), 1) << run.err();
+  terminal.type("0");
+  run.wait_for_prompt();
+  EXPECT_EQ(said(), 1) << "not at the second";
+  run.signal(SIGINT);
+  EXPECT_EQ(run.wait(), 130) << run.err();
 }
 
 TEST(Program, ThatIsEndedWhileItAsksTheModuleLeavesNoPowerOn) {
@@ -192,11 +231,9 @@ TEST(Program, TakesTheBoxesBiasWhenTheCampaignSaysSo) {
 
 TEST(Program, RefusesARateThatFoldsStepsOfTheCampaignAndNamesThem) {
   RunningBench bench({8, 100, "  []\n"});
-  EXPECT_THAT(ran({kphi(), "devices", "--wake-ups", "0.1", "--bench", bench.path("bench.yaml"), "--campaign",
-                   bench.path("short.yaml")},
-                  1)
-                  .out,
-              HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
+  EXPECT_THAT(
+      ran({kphi(), "devices", "--bench", bench.path("bench.yaml"), "--campaign", bench.path("short.yaml")}, 1).out,
+      HasSubstr("6000.0 RPM (1/rev at 100.00 Hz appears at 0.00 Hz)"));
   EXPECT_THAT(ran(bench.run_command(), 2).err, HasSubstr("set the RDT output rate to 7000 Hz"));
   EXPECT_TRUE(!std::filesystem::exists(bench.path("results")) || std::filesystem::is_empty(bench.path("results")));
 }

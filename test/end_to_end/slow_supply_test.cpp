@@ -5,6 +5,7 @@
 
 #include "results/run_reader.hpp"
 #include "results/steps_csv.hpp"
+#include "test/drivers/sim_equipment/scpi_tcp.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test::slow_supply_test {
@@ -73,6 +74,76 @@ TEST(SlowSupply, OfAKilledProgramIsSwitchedOffAllTheSame) {
   run.signal(SIGKILL);
   EXPECT_TRUE(bench.await([](const auto& now) { return now["supply"]["output"] == false; }, std::chrono::seconds(5)));
   EXPECT_EQ(run.wait(), 128 + SIGKILL);
+}
+
+/// A SCPI supply over TCP beside a simulated bench.
+class SlowInstrument : public testing::Test {
+ protected:
+  /// Each answer takes so long from now on.
+  void answer_after(double seconds) {
+    sim::Fault late{sim::FaultKind::ambient_late, {}, from_seconds(1e6), 0};
+    late.delay = from_seconds(seconds);
+    faults.set({late});
+  }
+  Process run() {
+    instrument.connect_load(6);
+    write(bench.path("scpi.yaml"), bytes_of(bench.path("bench.yaml")) +
+                                       fmt::format("supply: {{uri: \"scpi-tcp:127.0.0.1:{}\", voltage_v: 12, "
+                                                   "current_limit_a: 8, over_voltage_v: 14, over_current_a: 9}}\n",
+                                                   server.port()));
+    write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
+    return Process(in_real_time({kphi(), "run", bench.path("short.yaml"), "--bench", bench.path("scpi.yaml"), "--yes",
+                                 "--out", bench.path("results")}));
+  }
+  [[nodiscard]] static sim::ScpiType of_a_plain_maker() {
+    sim::ScpiType type;
+    type.plain_errors = true;
+    return type;
+  }
+  SteadyClock clock;
+  sim::UsbFaults faults{clock};
+  sim::ScpiInstrument instrument{of_a_plain_maker()};
+  sim::ScpiTcp server{instrument, faults};
+  RunningBench bench{Manner{1}};
+};
+
+TEST_F(SlowInstrument, IsReadLessOftenAndCarriesARun) {
+  for (const double answer_s : {0.1, 0.45}) {
+    answer_after(answer_s);
+    Process program = run();
+    ASSERT_EQ(program.wait(), 0) << program.err();
+    const results::RunRecording kept = results::read_run(the_run_in(bench.path("results")));
+    ASSERT_GE(kept.supply.size(), 1u);
+    for (const SupplyReading& reading : kept.supply) EXPECT_EQ(reading.voltage_v, 12);
+    for (std::size_t i = 1; i < kept.supply.size(); ++i)
+      EXPECT_GT(kept.supply[i].time_ns - kept.supply[i - 1].time_ns, static_cast<std::int64_t>(8 * answer_s * kSecond));
+    EXPECT_FALSE(instrument.state().output);
+    std::filesystem::remove_all(bench.path("results"));
+  }
+}
+
+TEST_F(SlowInstrument, IsSwitchedOffAfterOneAnswerNotAfterAReading) {
+  answer_after(0.45);
+  Process program = run();
+  program.wait_for("step  1/");  // connecting alone takes some twenty seconds
+  program.signal(SIGINT);
+  const auto asked = std::chrono::steady_clock::now();
+  while (instrument.state().output) ASSERT_TRUE(program.hear(std::chrono::milliseconds(5))) << program.err();
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - asked;
+  EXPECT_EQ(program.wait(), 130) << program.err();
+  EXPECT_LT(took.count(), 1.0) << "a reading takes 3.6 s";
+  EXPECT_THAT(program.err(), testing::HasSubstr("supply: output off"));
+}
+
+/// It becomes so slow with its output on that no reading of the voltage is there in time.
+TEST_F(SlowInstrument, WhoseVoltageWasNotReadIsNotSaidToGiveZeroVolts) {
+  Process program = run();
+  while (!instrument.state().output) ASSERT_TRUE(program.hear(std::chrono::milliseconds(1))) << program.err();
+  answer_after(0.95);
+  EXPECT_EQ(program.wait(), 3) << program.err();
+  EXPECT_THAT(program.err(), testing::HasSubstr("its voltage was not read within 3"));
+  EXPECT_THAT(program.err(), testing::Not(testing::HasSubstr("at the terminals")));
+  EXPECT_FALSE(instrument.state().output);
 }
 
 }  // namespace kphi::test::slow_supply_test

@@ -220,4 +220,15 @@ TEST_P(WaysOut, EndWithTheMotorCoasting) {
 INSTANTIATE_TEST_SUITE_P(Each, WaysOut, testing::ValuesIn(kWays),
                          [](const testing::TestParamInfo<Way>& way) { return std::string(way.param.name); });
 
+TEST(EndWithPower, IsTold) {
+  RunningBench bench(Manner{.time_scale = 4, .supply = true});
+  write(bench.path("short.yaml"), short_campaign_text("0", 1, 2));
+  Process run(bench.run_command());
+  ASSERT_TRUE(bench.await_speed(500)) << run.err();
+  (void)bench.fault("kind=supply_ignored_writes for_s=1000");
+  EXPECT_EQ(run.wait(), 4) << run.err();
+  EXPECT_NE(run.err().find("1 runs, "), std::string::npos) << "all is recorded\n" << run.err();
+  EXPECT_NE(run.err().find("output NOT confirmed off, it may be ON"), std::string::npos) << run.err();
+}
+
 }  // namespace kphi::test::ways_out_test

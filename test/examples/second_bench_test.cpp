@@ -210,7 +210,7 @@ class SecondBench : public Stand {
 
 TEST_F(SecondBench, IsCheckedAndItsDevicesTellOfThemselves) {
   EXPECT_THAT(ran({kphi(), "check", path("bench.yaml")}).out, HasSubstr("load cell  hx711"));
-  const auto devices = ran({kphi(), "devices", "--bench", path("bench.yaml"), "--wake-ups", "0"});
+  const auto devices = ran({kphi(), "devices", "--bench", path("bench.yaml")});
   EXPECT_THAT(devices.out, HasSubstr("hx711, 80 Hz, 20000 counts/N"));
   EXPECT_THAT(devices.out, HasSubstr("ESC on "));
 }

@@ -24,8 +24,9 @@ class LoggedDisk : public FileLayer {
     const auto path = std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor));
     log.push_back("sync " + path.filename().string() + ' ' + std::to_string(std::filesystem::file_size(path)));
   }
-  void sync_folder(const std::filesystem::path& folder) override {
+  bool sync_folder(const std::filesystem::path& folder) override {
     log.push_back("folder " + folder.filename().string());
+    return true;
   }
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override {
     log.push_back("rename " + from.filename().string() + ' ' + to.filename().string());

@@ -151,4 +151,23 @@ TEST(QualityFlags, HaveNamesBothWays) {
     EXPECT_EQ(quality_flags_from_names(quality_flag_names(flags)), flags);
 }
 
+TEST(FlaggedSteps, AreToldByTheirFlagsTheMostFrequentFirst) {
+  const auto bits = [](auto... flags) { return (static_cast<std::uint32_t>(flags) | ...); };
+  FlaggedSteps steps;
+  EXPECT_EQ(in_words(steps), "0 of 0 steps flagged");
+  steps.add(0);
+  EXPECT_EQ(in_words(steps), "0 of 1 steps flagged");
+  steps.add(bits(QualityFlag::supply_sag));
+  EXPECT_EQ(in_words(steps), "1 of 2 steps flagged (supply sagged 1; none spoils k)");
+  for (int i = 0; i < 2; ++i) steps.add(bits(QualityFlag::unsettled, QualityFlag::supply_sag));
+  steps.add(bits(QualityFlag::derated));
+  EXPECT_EQ(in_words(steps), "4 of 5 steps flagged (supply sagged 3, thrust never settled 2, motor derated 1)");
+  EXPECT_THAT(flag_counts(steps), ElementsAre(Pair("derated", 1), Pair("supply_sag", 3), Pair("unsettled", 2)));
+  steps.add(bits(QualityFlag::frozen, QualityFlag::silent));
+  EXPECT_EQ(
+      in_words(steps),
+      "5 of 6 steps flagged (supply sagged 3, thrust never settled 2, motor derated 1, load cell fell silent 1, 1 "
+      "more)");
+}
+
 }  // namespace kphi::results::steps_csv_test

@@ -24,7 +24,10 @@ class SpoiltDisk final : public results::FileLayer {
     operate();
     secured_.insert(std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor)));
   }
-  void sync_folder(const std::filesystem::path&) override { operate(); }
+  bool sync_folder(const std::filesystem::path&) override {
+    operate();
+    return true;
+  }
   void rename(const std::filesystem::path& from, const std::filesystem::path& to) override {
     operate();
     FileLayer::rename(from, to);

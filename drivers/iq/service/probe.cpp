@@ -230,15 +230,24 @@ std::vector<std::string> Probe::lines() const {
                                1e3 * to_seconds(round_trip), counters.requests, counters.replies,
                                counters.crc_errors + counters.wrong_length));
   }
-  if (clock_gain) {
-    text.push_back(
-        fmt::format("its clock runs {:+.1f} ppm against this computer's, u {:.1f} ppm, from {} readings over {:.0f} s; "
-                    "write under iq: in the bench file:",
-                    clock_gain->ppm(), 1e6 * clock_gain->u_factor, clock_gain->readings, clock_gain->duration_s));
-    text.push_back(clock_gain->yaml());
-  }
-  for (const Finding& finding : findings) text.push_back(finding.line());
   return text;
+}
+
+std::string Probe::in_short() const {
+  if (!record) return "";
+  return fmt::format("firmware {}, uid {}, supply {}, {}, round trip {:.2f} ms",
+                     record->firmware() ? record->firmware()->text() : "?", record->uid().empty() ? "?" : record->uid(),
+                     value_text(record->value<"power_monitor.volts">(), "V"), coil_words(*record),
+                     1e3 * to_seconds(round_trip));
+}
+
+std::vector<std::string> Probe::gain_lines() const {
+  if (!clock_gain) return {};
+  return {
+      fmt::format("its clock runs {:+.1f} ppm against this computer's, u {:.1f} ppm, from {} readings over {:.0f} s; "
+                  "write under iq: in the bench file:",
+                  clock_gain->ppm(), 1e6 * clock_gain->u_factor, clock_gain->readings, clock_gain->duration_s),
+      clock_gain->yaml()};
 }
 
 std::vector<Finding> set_timeout(const Ask& ask) {

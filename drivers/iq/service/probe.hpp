@@ -52,8 +52,12 @@ struct Probe {
   std::vector<Finding> findings;  ///< worst first
 
   [[nodiscard]] bool answers() const noexcept { return record.has_value(); }
-  /// For a person: identity, parameters, line, findings; no line feeds.
+  /// For a person: identity, parameters, line; no line feeds.
   [[nodiscard]] std::vector<std::string> lines() const;
+  /// What of it matters most, in one line.
+  [[nodiscard]] std::string in_short() const;
+  /// The clock's gain, if it was measured, and what to write into a bench file.
+  [[nodiscard]] std::vector<std::string> gain_lines() const;
 };
 
 /// Coasts the motor, sets the communication timeout, saves nothing, changes no baud rate. Failures become findings;

@@ -159,6 +159,7 @@ void read_identity(const Elements& elements, Configuration& configuration) {
   configuration.firmware = elements.text("mfgdigver");
   configuration.serial = elements.optional_text("mfgdigsn");
   configuration.slot = elements.whole_number("setcfgsel", 0, 15);
+  configuration.calibration = parse_integer<int>(elements.optional_text("cfgcalsel")).value_or(configuration.slot);
   configuration.slot_name = elements.optional_text("cfgnam");
   configuration.calibration_serial = elements.text("cfgcalsn");
   configuration.kind = kind_of(elements, configuration);

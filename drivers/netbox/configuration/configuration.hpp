@@ -43,6 +43,7 @@ struct Configuration {
   std::string serial;              ///< mfgdigsn, of the box; empty if it reports none
   std::string calibration_serial;  ///< cfgcalsn
   int slot = 0;                    ///< setcfgsel: zero-based, the box's web pages count from one
+  int calibration = 0;             ///< cfgcalsel, zero-based, too; the slot's number if the box reports none
   std::string slot_name;
   std::string force_unit, torque_unit;  ///< as the box spells them
   double counts_per_newton = 0, counts_per_newton_metre = 0;

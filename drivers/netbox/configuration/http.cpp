@@ -7,6 +7,7 @@
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <string_view>
+#include <thread>
 
 #include "base/error.hpp"
 #include "base/tcp.hpp"
@@ -18,14 +19,20 @@ namespace {
 namespace http = boost::beast::http;
 
 constexpr std::size_t kHeadLimit = 8192, kBodyLimit = 1 << 20;
+constexpr std::chrono::milliseconds kPauseAfterRefusal{300};
+constexpr const char* kCloseOthers = "close the box's web pages and other programs that ask it";
 
-/// An answer that is not one of a Net Box's web server.
+/// Why there is no page.
 struct Refused {
   std::string cause, next_move;
+  bool may_pass = false;  ///< a box that was asked too often says so, too
 };
-const Refused kNotHttp{"the answer is not HTTP", "not a Net Box: check the address and http_port"};
-const Refused kTooLong{"the answer is longer than 1 MiB", "not a Net Box: check the address"};
-const Refused kCutShort{"the connection ended early", "try again, then power-cycle the box"};
+const Refused kNotHttp{"could not read the answer: the answer is not HTTP",
+                       "not a Net Box: check the address and http_port"};
+const Refused kTooLong{"could not read the answer: the answer is longer than 1 MiB",
+                       "not a Net Box: check the address"};
+const Refused kCutShort{"could not read the answer: the connection ended early", "try again, then power-cycle the box"};
+const Refused kNoWord{kCutShort.cause, kCloseOthers, true};
 
 void refuse_if_wrong(const boost::system::error_code& error) {
   if (!error || error == http::error::need_more) return;
@@ -77,7 +84,7 @@ std::string read_head(TcpClient& box) {
   std::size_t end = std::string::npos;
   while (end == std::string::npos) {
     if (received.size() > kHeadLimit) throw kNotHttp;
-    if (!box.receive(received)) throw kCutShort;
+    if (!box.receive(received)) throw received.empty() ? kNoWord : kCutShort;
     if (!kScheme.starts_with(received.substr(0, kScheme.size()))) throw kNotHttp;
     end = end_of_head(received);
   }
@@ -115,29 +122,53 @@ std::string advice(const TcpError& error, const std::string& host, std::uint16_t
   return all + "; the box serves one connection at a time: close its web pages";
 }
 
-}  // namespace
+bool is_passing(unsigned status) {
+  constexpr unsigned kTooManyRequests = 429, kUnavailable = 503;
+  return status == kTooManyRequests || status == kUnavailable;
+}
 
-std::string http_get(const Host& host, std::uint16_t port, const std::string& target,
-                     std::chrono::nanoseconds wall_timeout, int wanted_status) {
-  const std::string device = fmt::format("Net Box {}:{}", host.name, port);
-  const std::string operation = "GET " + target;
+/// One connection. Throws Refused.
+std::string ask(const Host& host, std::uint16_t port, const std::string& target, std::chrono::nanoseconds wall_timeout,
+                int wanted_status) {
   TcpClient box(wall_timeout);
   try {
     box.connect(host, port);
-    box.send(fmt::format("{} HTTP/1.0\r\nHost: {}\r\n\r\n", operation, host.name));
+    box.send(fmt::format("GET {} HTTP/1.0\r\nHost: {}\r\n\r\n", target, host.name));
     http::response<http::string_body> response = read_response(box);
-    if (static_cast<int>(response.result_int()) == wanted_status) return std::move(response.body());
-    throw DeviceError(device, operation, fmt::format("HTTP status {}", response.result_int()),
-                      "check that this is a Net Box: open the address in a browser");
-  } catch (const Refused& refused) {
-    throw DeviceError(device, operation, fmt::format("could not {}: {}", box.step(), refused.cause), refused.next_move);
+    const unsigned status = response.result_int();
+    if (static_cast<int>(status) == wanted_status) return std::move(response.body());
+    const bool passing = is_passing(status);
+    throw Refused{fmt::format("HTTP status {}", status),
+                  passing ? kCloseOthers : "check that this is a Net Box: open the address in a browser", passing};
   } catch (const TcpError& error) {
+    using Cause = TcpError::Cause;
     const double seconds = std::chrono::duration<double>(wall_timeout).count();
-    throw DeviceError(device, operation,
-                      error.cause == TcpError::Cause::timeout
-                          ? fmt::format("no answer within {:.1f} s (could not {})", seconds, box.step())
-                          : fmt::format("could not {}: {}", box.step(), error.what()),
-                      advice(error, host.name, port));
+    throw Refused{error.cause == Cause::timeout
+                      ? fmt::format("no answer within {:.1f} s (could not {})", seconds, box.step())
+                      : fmt::format("could not {}: {}", box.step(), error.what()),
+                  advice(error, host.name, port), error.cause == Cause::refused || error.cause == Cause::reset};
+  }
+}
+
+}  // namespace
+
+std::string http_get(const Host& host, std::uint16_t port, const std::string& target,
+                     std::chrono::nanoseconds wall_timeout, int wanted_status, std::chrono::nanoseconds refused_for) {
+  const auto begun = std::chrono::steady_clock::now();
+  std::chrono::nanoseconds took{0};
+  for (int times = 1;; ++times) {
+    try {
+      return ask(host, port, target, wall_timeout - took, wanted_status);
+    } catch (const Refused& refused) {
+      took = std::chrono::steady_clock::now() - begun + kPauseAfterRefusal;
+      if (!refused.may_pass || took >= std::min(wall_timeout, refused_for)) {
+        const double seconds = std::chrono::duration<double>(took - kPauseAfterRefusal).count();
+        throw DeviceError(fmt::format("Net Box {}:{}", host.name, port), "GET " + target,
+                          refused.cause + (times == 1 ? "" : fmt::format(", {} times in {:.1f} s", times, seconds)),
+                          refused.next_move);
+      }
+    }
+    std::this_thread::sleep_for(kPauseAfterRefusal);
   }
 }
 

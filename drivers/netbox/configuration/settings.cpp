@@ -129,12 +129,11 @@ std::vector<Assignment> differences(const Shown& shown, const Configuration& box
   return found;
 }
 
-std::vector<std::string> read_slots(const Address& address) {
-  std::vector<std::string> slots;
-  for (int slot = 0; slot < kSlots; ++slot)
-    slots.push_back(
-        http_get(address.where(), address.http_port, fmt::format("/netftapi2.xml?index={}", slot), kTimeout));
-  return slots;
+/// Throws DeviceError for one that measures nothing.
+void check_slot(const Address& address, int slot) {
+  const std::string page =
+      http_get(address.where(), address.http_port, fmt::format("/netftapi2.xml?index={}", slot), kTimeout);
+  (void)parse_configuration(page, fmt::format("{}, slot {}", device(address), slot));
 }
 
 /// Findings: what was set back, and what somebody else has changed since.
@@ -180,10 +179,12 @@ constexpr unsigned kParse = pugi::parse_escapes | pugi::parse_ws_pcdata;
   refuse(path, std::strerror(errno), "check the folder and the space on the disk");
 }
 
-/// Forces a file or folder to the disk.
+/// Forces a file or folder to the disk. Some file systems know no sync of a folder.
 void sync(const std::filesystem::path& path) {
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.number() < 0 || fsync(file.number()) != 0) refuse_by_errno(path);
+  if (file.number() >= 0 && fsync(file.number()) == 0) return;
+  const bool is_unknown = errno == EINVAL || errno == ENOSYS || errno == EOPNOTSUPP || errno == EPERM;
+  if (file.number() < 0 || !is_unknown || !std::filesystem::is_directory(path)) refuse_by_errno(path);
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& path) {
@@ -203,7 +204,7 @@ void write_journal(const std::filesystem::path& path, const SettingsJournal& jou
     node.append_attribute("before") = changed.before;
     node.append_attribute("applied") = changed.applied;
   }
-  for (const std::string& slot : journal.slots) root.append_child("slot").text() = slot.c_str();
+  root.append_child("page").text() = journal.page.c_str();
   std::error_code error;
   std::filesystem::create_directories(folder_of(path), error);
   const std::filesystem::path part = path.string() + ".part";
@@ -229,7 +230,7 @@ std::optional<SettingsJournal> read_journal(const std::filesystem::path& path) {
     journal.changed.push_back(
         {node.attribute("key").value(), node.attribute("before").as_int(), node.attribute("applied").as_int()});
   }
-  for (const pugi::xml_node& node : root.children("slot")) journal.slots.emplace_back(node.text().get());
+  journal.page = root.child("page").text().get();
   return journal;
 }
 
@@ -261,16 +262,14 @@ void SettingsKeeper::try_to_restore() {
 }
 
 void SettingsKeeper::apply(const WantedSettings& wanted) {
+  if (wanted == WantedSettings{}) return;
   const Shown shown(address_);
   const Configuration box = parse_configuration(shown.xml(), device(address_));
   check_product(address_, box, wanted);
   const std::vector<Assignment> assignments = differences(shown, box, wanted);
   if (assignments.empty()) return;
-  SettingsJournal journal{shown.text("mfgdigsn"), {}, read_slots(address_)};
-  if (wanted.configuration) {
-    (void)parse_configuration(journal.slots[static_cast<std::size_t>(*wanted.configuration)],
-                              fmt::format("{}, slot {}", device(address_), *wanted.configuration));
-  }
+  if (wanted.configuration && *wanted.configuration != box.slot) check_slot(address_, *wanted.configuration);
+  SettingsJournal journal{shown.text("mfgdigsn"), {}, shown.xml()};
   for (const Assignment& a : assignments)
     journal.changed.push_back({a.setting->key, a.before, expected(*a.setting, a.asked, box)});
   const std::vector<ChangedSetting> planned = journal.changed;

@@ -23,7 +23,7 @@ struct ChangedSetting {
 struct SettingsJournal {
   std::string box;  ///< mfgdigsn; empty if the box reports none
   std::vector<ChangedSetting> changed;
-  std::vector<std::string> slots;  ///< netftapi2.xml of slot 0..15, verbatim
+  std::string page;  ///< netftapi2.xml before the change, verbatim, for a person
 };
 
 /// On the disk when this returns. Throws DeviceError.
@@ -39,15 +39,16 @@ struct WantedSettings {
   std::optional<int> records_per_datagram = std::nullopt;  ///< 1..40
   std::optional<int> filter = std::nullopt;                ///< code 0..12, see filter_cutoff_hz
   std::optional<int> configuration = std::nullopt;         ///< slot 0..15; the box's web pages count from one
+  friend bool operator==(const WantedSettings&, const WantedSettings&) = default;
 };
 
-/// Each request blocks for at most 2 s; there are 16 plus a few. One thread. The box must not stream: some stop when
-/// the rate is written.
+/// Each request blocks for at most 2 s; there are two for each change, and two more. One thread. The box must not
+/// stream: some stop when the rate is written.
 class SettingsKeeper {
  public:
-  /// Restores the settings that a killed program has left in `journal`; reads the configuration; if a setting differs,
-  /// keeps their values and the XML of all 16 slots in `journal` (synced to the disk), then writes, one URL per page,
-  /// and reads back. Writes nothing, and no journal, if `wanted` is empty or already set. Throws DeviceError, after
+  /// Restores the settings that a killed program has left in `journal`; asks for nothing else if `wanted` is empty.
+  /// Reads the configuration; if a setting differs, keeps their values in `journal` (synced to the disk), then writes,
+  /// one URL per page, and reads back. Writes nothing, and no journal, if all is so already. Throws DeviceError, after
   /// restoring what was changed: out of range, an unusable slot, rate or filter of an Ethernet Axia, the box does not
   /// answer 302 or refuses a setting.
   SettingsKeeper(Address address, const WantedSettings& wanted, std::filesystem::path journal);

@@ -26,8 +26,9 @@ constexpr std::chrono::nanoseconds kHealthPeriod = 20ms;
 constexpr std::chrono::nanoseconds kLongestLinger = 250ms, kQuiet = 50ms;
 constexpr int kBatchesPerDrain = 64;
 
-std::string fetch_configuration(const Address& address, std::chrono::nanoseconds wall_timeout) {
-  return http_get(address.where(), address.http_port, "/netftapi2.xml", wall_timeout);
+std::string fetch_configuration(const Address& address, std::chrono::nanoseconds wall_timeout,
+                                std::chrono::nanoseconds refused_for) {
+  return http_get(address.where(), address.http_port, "/netftapi2.xml", wall_timeout, 200, refused_for);
 }
 
 /// True if a descriptor became readable within `wall`.
@@ -46,7 +47,8 @@ void sleep_for(Duration wall) {
 LoadCell::LoadCell(const Address& address, const Clock& clock)
     : address_(address),
       clock_(clock),
-      configuration_(parse_configuration(fetch_configuration(address, kHttpTimeout), "Net Box " + address.host)),
+      configuration_(
+          parse_configuration(fetch_configuration(address, kHttpTimeout, kRefusedFor), "Net Box " + address.host)),
       socket_(address.where(), address.rdt_port),
       connection_(configuration_, to_seconds(clock.stretched(1s))),
       inquirer_(start_thread({"box inquiries"}, [this] { answer_questions(); })) {}
@@ -209,7 +211,8 @@ void LoadCell::answer_questions() noexcept {
       inquiry_.wait(present);
       continue;
     }
-    answer_ = ask_box([this] { return fetch_configuration(address_, kAnswerTimeout); });
+    // A refusal is an answer here: the box was away, or boots.
+    answer_ = ask_box([this] { return fetch_configuration(address_, kAnswerTimeout, 0ns); });
     inquiry_.compare_exchange_strong(present, Inquiry::answered);  // unless it is `ending` by now
     order_wakeup_.raise();
   }

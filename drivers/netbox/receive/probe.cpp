@@ -103,7 +103,18 @@ std::vector<std::string> Probe::lines() const {
     text.push_back(fmt::format("noise {:.2g} N, {:.2g} N m (standard deviation of a record, where nothing moves)",
                                fmt::join(deviation.first(3), " "), fmt::join(deviation.last(3), " ")));
   }
-  for (const Finding& finding : findings) text.push_back(finding.line());
+  return text;
+}
+
+std::string Probe::in_short() const {
+  if (!configuration) return "";
+  const Configuration& box = *configuration;
+  std::string text =
+      fmt::format("{} {}, {:g} N, {:.4g} Hz, {}", box.product.empty() ? "Net Box" : box.product, box.calibration_serial,
+                  fmt::join(std::span(box.range).first(3), " "), box.rdt_rate_hz, filter_words(box));
+  if (streamed)
+    text += fmt::format(", {} of {} records lost, noise {:.2g} N", counters.lost_network + counters.lost_host,
+                        counters.expected, fmt::join(std::span(noise.standard_deviation).first(3), " "));
   return text;
 }
 

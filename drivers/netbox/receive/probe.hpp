@@ -33,8 +33,10 @@ struct Probe {
   std::vector<Finding> findings;  ///< worst first
 
   [[nodiscard]] bool answers() const noexcept { return configuration.has_value() && streamed; }
-  /// For a person: identity, settings, stream, findings; no line feeds.
+  /// For a person: identity, settings, stream; no line feeds.
   [[nodiscard]] std::vector<std::string> lines() const;
+  /// What of it matters most, in one line.
+  [[nodiscard]] std::string in_short() const;
 };
 
 /// Blocks for `stream` and a few seconds more when something does not answer. Stops a stream of another client: do not

@@ -47,7 +47,8 @@ class NetBoxDevice {
   /// Next datagram to send, oldest first; false when there is none.
   bool next_datagram(Datagram& out);
   /// Complete HTTP/1.0 answer to one complete request; the box closes the connection after it. Pages: netftapi2.xml and
-  /// netftcalapi.xml, with or without ?index=0..15, setting.cgi and comm.cgi; 404 for anything else.
+  /// netftcalapi.xml, with or without ?index=0..15, setting.cgi and comm.cgi; 404 for anything else. Empty: it closes
+  /// the connection without a word.
   [[nodiscard]] std::string http(std::string_view request);
   /// Takes whole commands of 20 bytes off the front of `received` and returns the answers to them.
   [[nodiscard]] std::string tcp(std::string& received) const;
@@ -109,9 +110,16 @@ class NetBoxDevice {
 
   std::deque<Datagram> waiting_;
   std::uint64_t records_sent_ = 0;
-  std::uint64_t ticks_ = 0;         ///< since it was made
-  std::uint64_t writes_since_ = 0;  ///< tick of the first CGI write of the present second
-  int writes_ = 0;                  ///< in that second
+  std::uint64_t ticks_ = 0;  ///< since it was made
+
+  /// Requests in seconds that begin with a request.
+  struct PerSecond {
+    std::uint64_t since = 0;  ///< tick of the first of the present second
+    int n = 0;                ///< in that second
+    /// How many there were in it with this one.
+    int count(std::uint64_t tick) noexcept;
+  };
+  PerSecond requests_, writes_;
 };
 
 }  // namespace kphi::sim

@@ -22,7 +22,7 @@ constexpr QuirkRow flag(std::string_view name) {
   return {name, [](Q& quirks, int index) { quirks.*Flag = index == 1; }};
 }
 
-constexpr std::array<QuirkRow, 8> kQuirks{{
+constexpr std::array<QuirkRow, 9> kQuirks{{
     flag<&Q::bias_stops_stream>("bias_stops_stream"),
     {"rate_write", [](Q& q, int i) { q.rate_write = static_cast<Q::RateWrite>(i); }, {"stops", "continues", "pauses"}},
     {"last_block", [](Q& q, int i) { q.last_block = static_cast<Q::LastBlock>(i); }, {"partial", "padded", "dropped"}},
@@ -31,6 +31,9 @@ constexpr std::array<QuirkRow, 8> kQuirks{{
     {"array_separator", [](Q& q, int i) { q.array_separator = ";, "[i]; }, {"semicolon", "comma", "blank"}},
     flag<&Q::axia>("axia"),
     flag<&Q::only_three_writes>("only_three_writes"),
+    {"served",
+     [](Q& q, int i) { q.served = static_cast<Q::Served>(i); },
+     {"all", "three_then_closed", "three_then_503"}},
 }};
 
 }  // namespace

@@ -51,7 +51,10 @@ struct NetBoxQuirks {
   bool flags_as_digits = false;               ///< 1 and 0 instead of Enabled and Disabled
   char array_separator = ';';                 ///< of arrays in the XML: semicolon, comma or blank
   bool axia = false;                          ///< Ethernet Axia: other commands, other status bits
-  bool only_three_writes = false;             ///< of CGI within a second
+  bool only_three_writes = false;             ///< of CGI within a second; further ones are answered, and ignored
+  /// Pages and CGI served within a second: all, or three, and the next connections end without a word or with a status.
+  enum class Served : std::uint8_t { all, three_then_closed, three_then_503 };
+  Served served = Served::all;
 };
 
 /// `name` as above; `value`: true or false, or a word. Throws FaultEntryError.

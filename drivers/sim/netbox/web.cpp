@@ -16,7 +16,7 @@ namespace kphi::sim {
 namespace {
 
 constexpr std::size_t kFloatCharacters = 20;
-constexpr int kWritesServed = 3;
+constexpr int kServedInASecond = 3;
 constexpr const char* kSerial = "FT21001";  // of calibration 0
 constexpr const char* kNoSerial = "FT0000";
 
@@ -182,8 +182,16 @@ std::string in_utf_16(const std::string& answer) {
 
 }  // namespace
 
+int NetBoxDevice::PerSecond::count(std::uint64_t tick) noexcept {
+  if (n == 0 || tick - since >= static_cast<std::uint64_t>(kTicksPerSecond)) *this = {tick, 0};
+  return ++n;
+}
+
 std::string NetBoxDevice::http(std::string_view request) {
   constexpr std::string_view kGet = "GET /";
+  using Served = NetBoxQuirks::Served;
+  if (requests_.count(ticks_) > kServedInASecond && settings_.quirks.served != Served::all)
+    return settings_.quirks.served == Served::three_then_closed ? "" : refusal("503 Service Unavailable");
   if (!request.starts_with(kGet)) return not_found();
   request.remove_prefix(kGet.size());
   const std::string_view target = request.substr(0, request.find_first_of(" \r\n"));
@@ -198,11 +206,7 @@ std::string NetBoxDevice::http(std::string_view request) {
 }
 
 std::string NetBoxDevice::write(std::string_view page, std::string_view query) {
-  if (writes_ == 0 || ticks_ - writes_since_ >= static_cast<std::uint64_t>(kTicksPerSecond)) {
-    writes_since_ = ticks_;
-    writes_ = 0;
-  }
-  if (++writes_ > kWritesServed && settings_.quirks.only_three_writes) return found(page);
+  if (writes_.count(ticks_) > kServedInASecond && settings_.quirks.only_three_writes) return found(page);
   NetBoxSettings wanted = settings_;
   while (!query.empty()) {
     const std::string_view pair = query.substr(0, query.find('&'));

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <optional>
 #include <stdexcept>
 
 #include "daq/guard/interlock.hpp"
@@ -52,6 +54,62 @@ TEST(MotorPower, ThatIsNotConfirmedOffIsASafetyStop) {
   MotorPower power(&bench.supply, test::never);
   bench.supply.unconfirmed = kNotOff;
   EXPECT_THROW((void)power.off(bench.motor), SafetyStop);
+}
+
+/// What leaves `work`, if the supply does not confirm that it is off again.
+template <class Thrown>
+std::optional<Thrown> thrown_by(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Thrown& thrown) {
+    return thrown;
+  }
+  return std::nullopt;
+}
+
+TEST(MotorPower, ThatIsNotConfirmedOffAfterAnInterruptionIsToldOf) {
+  PoweredMotor bench;
+  bench.supply.unconfirmed = kNotOff;
+  bench.supply.interrupted = true;
+  const auto stop = thrown_by<Interrupted>([&] { const MotorPower power(&bench.supply, test::never); });
+  ASSERT_TRUE(stop.has_value());
+  EXPECT_EQ(stop->words().state, kNotOff);
+  EXPECT_EQ(stop->exit_code(), ExitCode::interrupted);
+  bench.supply.unconfirmed.clear();
+  EXPECT_EQ(thrown_by<Interrupted>([&] { const MotorPower power(&bench.supply, test::never); })->words().state, "");
+}
+
+TEST(MotorPower, ThatIsNotConfirmedOffAfterAFailureIsToldOfWithTheFailuresExitCode) {
+  PoweredMotor bench;
+  bench.supply.unconfirmed = kNotOff;
+  const auto fail = [&] {
+    try {
+      throw DeviceError("motor", "connect", "no answer");
+    } catch (...) {
+      rethrow_without_power(&bench.supply);
+    }
+  };
+  const auto stop = thrown_by<RunStopped>(fail);
+  ASSERT_TRUE(stop.has_value());
+  EXPECT_EQ(stop->words().cause, "motor: connect: no answer");
+  EXPECT_EQ(stop->words().state, kNotOff);
+  EXPECT_EQ(stop->exit_code(), ExitCode::no_device);
+  bench.supply.unconfirmed.clear();
+  EXPECT_TRUE(thrown_by<DeviceError>(fail).has_value()) << "as it was";
+}
+
+TEST(MotorPower, IsCutHoweverTheWorkAtTheBenchEndsAndIsToldOfOnce) {
+  QueueSupply supply;
+  QueueBench bench;
+  bench.supply_link = &supply;
+  supply.unconfirmed = kNotOff;
+  const auto state_after = [&](const StopWords& words) {
+    return thrown_by<Interrupted>([&] { leave_without_power(bench, [&] { throw Interrupted(words); }); })
+        ->words()
+        .state;
+  };
+  EXPECT_EQ(state_after({.cause = "stopped by request"}), kNotOff);
+  EXPECT_EQ(state_after({.cause = "stopped by request", .state = "supply: output off"}), "supply: output off");
 }
 
 TEST(MotorPower, ComesBackToNoBenchWhoseComputerSlept) {

@@ -15,7 +15,7 @@ TEST_F(ShortCampaign, AsksForEachMountingOnceAndRunsAllItsRepetitions) {
   EXPECT_THAT(person_.mounted_deg, ElementsAre(0, 90));
   EXPECT_EQ(person_.propeller, "5x3");
   EXPECT_EQ(result.runs, 4);
-  EXPECT_EQ(result.steps, 12);
+  EXPECT_EQ(result.steps.steps, 12);
   EXPECT_EQ(result.lost, 0u);
   EXPECT_EQ(results_->complete_runs().size(), 4u);
   EXPECT_THAT(journaled(), ElementsAre("campaign_started", "clock_unchecked", "mounted", "run_accepted",

@@ -124,7 +124,7 @@ TEST_F(DryRunOfAShortCampaign, RefusesADiskThatIsTooFullAndAFolderThatCannotBeWr
   EXPECT_THAT(line(dry_run(campaign_, config_, folder_.path(), {}, full), "disk"), HasSubstr("fault: "));
   std::ofstream(folder_.path() / "file") << "x";
   EXPECT_THAT(line(dry_run(campaign_, config_, folder_.path() / "file" / "results", {}), "files"),
-              HasSubstr("file is not writable"));
+              HasSubstr("file: no run can be kept here: Not a directory"));
   EXPECT_THAT(line(dry(), "files"), HasSubstr("note: "));
 }
 

@@ -54,7 +54,7 @@ TEST_F(Resume, GoesOnAtTheFirstUnfinishedRunAndGivesTheBytesOfACampaignThatWasNe
   ASSERT_EQ(before.size(), 4u);
   const CampaignResult result = resume();
   EXPECT_EQ(result.runs, 6);
-  EXPECT_EQ(result.steps, 12);
+  EXPECT_EQ(result.steps.steps, 12);
   EXPECT_THAT(person_.mounted_deg, ElementsAre(90, 180)) << "what was mounted then may not be now";
   EXPECT_TRUE(results::verify_campaign(*results_).whole());
   const auto after = measured_in(*results_);

@@ -122,6 +122,15 @@ TEST_F(CombinedLimits, BelieveNoDeviceThatSaysNonsense) {
   }
 }
 
+TEST_F(CombinedLimits, OfASlowSuppliesAgeAreAsLongAsItsReadingsTake) {
+  config_.supply = profiles::SupplyConfig{"x", Volts(12), Amperes(20), Volts(14), Amperes(22)};
+  expect(Watched::supply_age, 2, "kphi");
+  devices_.emplace().supply_reading_s = 0.45;
+  expect(Watched::supply_age, 2, "kphi");
+  devices_->supply_reading_s = 3.6;
+  expect(Watched::supply_age, 8.2, "kphi; a reading takes 3.6 s");
+}
+
 TEST_F(CombinedLimits, OfASpeedErrorCanOnlyBeTightened) {
   expect(Watched::speed_error, 15, "kphi");
   campaign_.limits["speed_error_max_percent"] = 5;

@@ -36,6 +36,11 @@ class SettableWeb {
     const std::lock_guard lock(mutex_);
     manner_ = std::move(manner);
   }
+  /// Of any kind.
+  int requests() const {
+    const std::lock_guard lock(mutex_);
+    return requests_;
+  }
   /// Targets of the CGI requests, in their order.
   std::vector<std::string> writes() const {
     const std::lock_guard lock(mutex_);
@@ -48,6 +53,7 @@ class SettableWeb {
   }
   std::string answer(const std::string& request) {
     const std::lock_guard lock(mutex_);
+    ++requests_;
     const std::string target = request.substr(4, request.find(' ', 4) - 4);
     const std::size_t question = target.find('?');
     const std::string query = question == std::string::npos ? "" : target.substr(question + 1);
@@ -80,6 +86,7 @@ class SettableWeb {
   std::map<std::string, std::string> values_{
       {"comrdtrate", "7000"}, {"comrdtbsiz", "40"}, {"setuserfilter", "0"}, {"setcfgsel", "0"}};
   std::vector<std::string> writes_;
+  int requests_ = 0;
   FakeWeb web_;
 };
 

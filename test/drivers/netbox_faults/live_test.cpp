@@ -130,13 +130,18 @@ TEST_F(Live, TheProbeNamesAnAxiasFaultByItsOwnMap) {
   settings.stream = 300ms;
   const Probe found = probe(address(), clock, settings);
   std::string all;
-  for (const std::string& line : found.lines()) all += line + "\n";
+  for (const Finding& finding : found.findings) all += finding.line() + "\n";
   EXPECT_THAT(all, HasSubstr("the box reports: force or torque out of range"));
   EXPECT_THAT(all, Not(HasSubstr("CPU or RAM")));
 }
 
-TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
-  start({}, {.only_three_writes = true});
+class SlowWeb : public Live {
+ protected:
+  void write_and_set_back(const sim::NetBoxQuirks& quirks);
+};
+
+void SlowWeb::write_and_set_back(const sim::NetBoxQuirks& quirks) {
+  start({}, quirks);
   const kphi::test::TemporaryFolder folder;
   const std::filesystem::path journal = folder / "journal";
   for (int round = 0; round < 3; ++round) {
@@ -152,6 +157,16 @@ TEST_F(Live, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
   EXPECT_EQ(cell.configuration().records_per_datagram, 40);
   EXPECT_EQ(cell.configuration().filter_code, 0);
   EXPECT_FALSE(std::filesystem::exists(journal));
+}
+
+TEST_F(SlowWeb, SettingsAreWrittenAndSetBackOnABoxThatServesThreeWritesASecond) {
+  write_and_set_back({.only_three_writes = true});
+}
+
+TEST_F(SlowWeb, SettingsAreWrittenAndSetBackOnABoxThatServesThreeRequestsASecond) {
+  using Served = sim::NetBoxQuirks::Served;
+  for (const Served served : {Served::three_then_closed, Served::three_then_503})
+    write_and_set_back({.served = served});
 }
 
 }  // namespace kphi::netbox::test::live_test

@@ -132,6 +132,37 @@ TEST_F(ScpiSupplyTest, SurfacesTheInstrumentsOwnErrors) {
   EXPECT_THAT(refusal([](ScpiSupply& supply) { supply.apply(kTwelveVolts); }), HasSubstr("Data out of range"));
 }
 
+TEST_F(ScpiSupplyTest, TakesZeroWithoutACommaForNoError) {
+  for (const char* none : {"0  No Error", "+0  No error", " 0 No Error", "0", "0,\"No error\""}) {
+    line.answers["SYST:ERR?"] = none;
+    EXPECT_EQ(refusal([](ScpiSupply& supply) { supply.apply(kTwelveVolts); }), "") << none;
+  }
+  for (const char* error : {"-222  Data Out Of Range", "Error", ""}) {
+    line.answers["SYST:ERR?"] = error;
+    EXPECT_THAT(refusal([](ScpiSupply& supply) { supply.apply(kTwelveVolts); }), HasSubstr(error)) << error;
+  }
+}
+
+TEST_F(ScpiSupplyTest, IsOffWhenItSaysSoWhateverItsErrorsAre) {
+  line.answers["SYST:ERR?"] = "-113,\"Undefined header\"";
+  ScpiSupply supply(lend(line), clock);
+  supply.switch_off();
+  line.answers["OUTP?"] = "1";
+  line.obeys = false;
+  EXPECT_THAT(kphi::refusal([&] { supply.switch_off(); }),
+              testing::AllOf(HasSubstr("the output stays on"), HasSubstr("Undefined header")));
+}
+
+TEST_F(ScpiSupplyTest, AReadingIsLeftBetweenTwoQuestions) {
+  ScpiSupply supply(lend(line), clock);
+  line.answers.erase("OUTP?");  // would fail if it were asked
+  int asked = 0;
+  EXPECT_THROW((void)supply.read([&] {
+    if (++asked == 2) throw std::runtime_error("something urgent");
+  }),
+               std::runtime_error);
+}
+
 TEST_F(ScpiSupplyTest, RefusesNumbersThatCannotBe) {
   line.answers["MEAS:VOLT?"] = "112";
   EXPECT_THAT(refusal([](ScpiSupply& supply) { (void)supply.read(); }), HasSubstr("is impossible"));

@@ -112,11 +112,14 @@ void reset(ScpiState& s) {
   s = fresh;
 }
 
-std::string next_error(ScpiState& s) {
-  if (s.errors.empty()) return "0,\"No error\"";
-  const auto [code, words] = s.errors.front();
-  s.errors.pop_front();
-  return fmt::format("{},\"{}\"", code, words);
+std::string next_error(const Call& c) {
+  std::pair<int, std::string> error{0, c.type.plain_errors ? "No Error" : "No error"};
+  if (!c.state.errors.empty()) {
+    error = c.state.errors.front();
+    c.state.errors.pop_front();
+  }
+  return c.type.plain_errors ? fmt::format("{}  {}", error.first, error.second)
+                             : fmt::format("{},\"{}\"", error.first, error.second);
 }
 
 std::string measured(const Call& c, double value) {
@@ -151,8 +154,8 @@ const std::vector<Row>& rows() {
       {"*CLS", all, ORDER(c.state.errors.clear())},
       {"*RST", all, ORDER(reset(c.state))},
       {"*OPC?", all, [](const Call&) { return std::string("1"); }},
-      {"SYSTem:ERRor?", all, ANSWER(next_error(c.state))},
-      {"SYSTem:ERRor:NEXT?", all, ANSWER(next_error(c.state))},
+      {"SYSTem:ERRor?", all, ANSWER(next_error(c))},
+      {"SYSTem:ERRor:NEXT?", all, ANSWER(next_error(c))},
       {"VOLTage", supplies, ORDER(set_within(c, c.state.voltage_v, c.type.voltage_max_v))},
       {"VOLTage?", supplies, ANSWER(told(c, c.state.voltage_v, c.type.voltage_max_v))},
       {"CURRent", supplies, ORDER(set_within(c, c.state.current_a, c.type.current_max_a))},

@@ -21,6 +21,7 @@ struct ScpiType {
   ScpiFamily family = ScpiFamily::standard;
   double voltage_max_v = 30, current_max_a = 10;
   bool measures_power = true;
+  bool plain_errors = false;  ///< SYST:ERR? answers `0  No Error`, as several makes do
 };
 
 /// Everything inside, plain.

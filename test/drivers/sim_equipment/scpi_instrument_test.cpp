@@ -30,6 +30,14 @@ TEST(SimulatedScpiInstrument, QueuesWhatItDoesNotLike) {
   EXPECT_EQ(supply.apply("*CLS;SYST:ERR?"), "0,\"No error\"");
 }
 
+TEST(SimulatedScpiInstrument, ReportsItsErrorsWithoutACommaIfItIsOfSuchAMaker) {
+  ScpiType type;
+  type.plain_errors = true;
+  ScpiInstrument supply(type);
+  EXPECT_EQ(supply.apply("SYST:ERR?"), "0  No Error");
+  EXPECT_EQ(supply.apply("FOO;SYST:ERR?"), "-113  Undefined header");
+}
+
 TEST(SimulatedScpiInstrument, HoldsTheVoltageUntilTheLimitOfTheCurrent) {
   ScpiInstrument supply;
   supply.connect_load(6);

@@ -48,13 +48,14 @@ class FakeSupply final : public Supply {
   explicit FakeSupply(Script& script) : script_(script) { identity_.device = "fake supply"; }
   [[nodiscard]] const Identity& identity() const noexcept override { return identity_; }
   Limits apply(const Limits& limits) override { return limits; }
-  [[nodiscard]] SupplyReading read() override {
+  [[nodiscard]] SupplyReading read(const std::function<void()>& between) override {
     const int look = ++script_.looks;
     if (look == 1 && script_.inside != nullptr) {
       script_.inside->count_down();
       script_.release->wait();
     }
     if (script_.throws_oddly) throw 42;
+    between();
     if (script_.read_fails) throw DeviceError("fake supply", "read", "the line is lost", "plug it in");
     SupplyReading reading;
     reading.time_ns = look;
@@ -273,6 +274,19 @@ TEST_F(SupplyWorker, LetsNobodyWaitForASlowSupply) {
   EXPECT_TRUE(script.output);
   release.count_down();
   EXPECT_TRUE(soon([&] { return !script.output; }));
+}
+
+TEST_F(SupplyWorker, LeavesALongReadingForAnOrderToSwitchOff) {
+  std::latch inside(1), release(1);
+  script.inside = &inside;
+  script.release = &release;
+  Worker worker(fake(script), clock, 0.01);  // no further reading of its own
+  inside.wait();
+  worker.switch_off();
+  release.count_down();
+  EXPECT_TRUE(soon([&] { return !script.output; }));
+  EXPECT_FALSE(worker.newest()) << "half a reading is none";
+  EXPECT_TRUE(worker.alive());
 }
 
 /// While a look goes on, on and off are asked for, in this order: it never goes on.

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
+
 #include "test/drivers/netbox/fake_box.hpp"
 #include "test/refusal.hpp"
 
@@ -11,6 +13,7 @@ using namespace std::chrono_literals;
 using test::FakeWeb;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 std::string failure(std::uint16_t port, std::chrono::nanoseconds timeout = 10s) {
@@ -96,9 +99,32 @@ TEST(HttpGet, JustUnderOneMebibyteIsTaken) {
   EXPECT_EQ(http_get("127.0.0.1", web.port(), "/", 10s).size(), (1u << 20) - 1);
 }
 
-TEST(HttpGet, AClosedPortIsNamedAtOnce) {
+TEST(HttpGet, AClosedPortIsNamed) {
   const test::LoopbackSocket closed(SOCK_STREAM);  // bound, not listening
-  EXPECT_THAT(failure(closed.port()), AllOf(HasSubstr("could not connect"), HasSubstr("no web server on port")));
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_THAT(failure(closed.port()), AllOf(HasSubstr("could not connect"), HasSubstr("no web server on port"),
+                                            HasSubstr("times in 1."), Not(HasSubstr("close the box's web pages"))));
+  EXPECT_GE(std::chrono::steady_clock::now() - begun, kRefusedFor - 400ms);
+}
+
+/// What a box does that was asked too often, and then answers.
+TEST(HttpGet, ARefusalIsAskedAgain) {
+  for (const char* refusal : {"", "HTTP/1.0 503 Service Unavailable\r\n\r\n", "HTTP/1.0 429 Too Many\r\n\r\n"}) {
+    std::atomic<int> asked{0};
+    FakeWeb::Manner manner;
+    manner.answer = [&](const std::string&) {
+      return ++asked < 3 ? std::string(refusal) : "HTTP/1.0 200 OK\r\n\r\n<netft/>";
+    };
+    const FakeWeb web(manner);
+    EXPECT_EQ(http_get("127.0.0.1", web.port(), "/", 10s), "<netft/>") << refusal;
+    EXPECT_EQ(asked, 3);
+  }
+}
+
+TEST(HttpGet, ABoxThatGoesOnRefusingIsNamedWithHowOftenItWasAsked) {
+  FakeWeb web(FakeWeb::page("", "503 Service Unavailable"));
+  EXPECT_THAT(failure(web.port()), AllOf(HasSubstr("HTTP status 503, 5 times in 1."), HasSubstr("other programs")));
+  EXPECT_THAT(failure(web.port(), 100ms), Not(HasSubstr("times"))) << "there was no time for another question";
 }
 
 TEST(HttpGet, AnUnknownNameIsNamed) {

@@ -34,7 +34,8 @@ TEST(BoxProbe, TellsWhoAnswersAndHowWellItStreams) {
   EXPECT_THAT(lines, Contains(HasSubstr("ranges 330 330 990 N, 30 30 30 N m")));
   EXPECT_THAT(lines, Contains(HasSubstr("RDT enabled, 7000 Hz, 40 records per datagram, no filter")));
   EXPECT_THAT(lines, Contains(HasSubstr("0 lost, 0 late, 0 duplicates")));
-  EXPECT_THAT(lines, Contains(HasSubstr("note: could not cross-check the scale")));
+  EXPECT_THAT(found.findings, Contains(testing::Field(&Finding::what, HasSubstr("could not cross-check the scale"))));
+  EXPECT_THAT(found.in_short(), HasSubstr("330 330 990 N, 7000 Hz, no filter, 0 of "));
   EXPECT_EQ(bench.box.settings_written() + bench.box.biases(), 0) << "a probe changes nothing";
 }
 
@@ -52,7 +53,9 @@ TEST(BoxProbe, CountsWhatTheNetworkLoses) {
   BenchBox bench({.skip_every = 10});
   const Probe found = probe(bench.address, bench.clock, quick());
   EXPECT_TRUE(found.answers());
-  EXPECT_THAT(found.lines(), Contains(testing::AllOf(HasSubstr("warning"), HasSubstr("lost in the network"))));
+  EXPECT_THAT(found.findings,
+              Contains(testing::AllOf(testing::Field(&Finding::severity, Severity::warning),
+                                      testing::Field(&Finding::what, HasSubstr("lost in the network")))));
 }
 
 TEST(BoxProbe, ABoxThatDoesNotAnswerIsAFindingAndNoException) {

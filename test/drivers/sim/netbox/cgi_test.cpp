@@ -95,4 +95,19 @@ TEST_F(NetBoxWrites, BeyondThreeInASecondAreLostOnSomeBoxes) {
   EXPECT_EQ(element(box, "comrdtrate"), "70");
 }
 
+TEST_F(NetBoxWrites, AndPagesBeyondThreeInASecondAreRefusedOnOthers) {
+  using Served = NetBoxQuirks::Served;
+  const auto serves_three_then = [&](const char* beyond) {
+    const auto ask = [&] { return box.http("GET /netftapi2.xml HTTP/1.0"); };
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(ask().starts_with("HTTP/1.0 200"));
+    EXPECT_EQ(ask().substr(0, 12), beyond);
+    test::after(box, 7000);
+    EXPECT_TRUE(ask().starts_with("HTTP/1.0 200"));
+  };
+  box = box_that([](NetBoxSettings& s) { s.quirks.served = Served::three_then_closed; });
+  serves_three_then("");
+  box = box_that([](NetBoxSettings& s) { s.quirks.served = Served::three_then_503; });
+  serves_three_then("HTTP/1.0 503");
+}
+
 }  // namespace kphi::sim::cgi_test
