@@ -20,7 +20,8 @@ static_assert(KPHI_MAX_CORNERS == ConvexPolygon::kMaxCorners && KPHI_MAX_ROTORS 
 static_assert(KPHI_ARM_ANGLE_STALE == static_cast<int>(Flag::arm_angle_stale) &&
               KPHI_THRUST_NAN == static_cast<int>(Flag::thrust_nan));
 static_assert(KPHI_LOAD_SHARE == static_cast<int>(OverlapMeasure::load_share));
-static_assert(KPHI_DEMAND_NAN == static_cast<int>(Concession::demand_nan));
+static_assert(KPHI_DEMAND_NAN == static_cast<int>(Concession::demand_nan) &&
+              KPHI_MIX_UNFINISHED == static_cast<int>(Concession::unfinished));
 static_assert(KPHI_LAW_PUBLISHED == static_cast<int>(ScalingLaw::published));
 static_assert(sizeof(unsigned short) == sizeof(Flags));
 

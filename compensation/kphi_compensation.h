@@ -49,7 +49,13 @@ enum {
   KPHI_ARM_ANGLE_STALE = 512
 };
 // What the mixer gave up (mixing.hpp).
-enum { KPHI_GAVE_YAW = 1, KPHI_GAVE_THRUST = 2, KPHI_GAVE_ROLL_PITCH = 4, KPHI_DEMAND_NAN = 8 };
+enum {
+  KPHI_GAVE_YAW = 1,
+  KPHI_GAVE_THRUST = 2,
+  KPHI_GAVE_ROLL_PITCH = 4,
+  KPHI_DEMAND_NAN = 8,
+  KPHI_MIX_UNFINISHED = 16
+};
 // What deserves a look before a curve is flown (compensator.hpp).
 enum { KPHI_GAINS_WITH_OCCLUSION = 1, KPHI_STEPS_AT_CONTACT = 2 };
 
@@ -176,9 +182,9 @@ int kphi_mixer_build(kphi_mixer* out, int rotors, const kphi_real (*hubs)[2], co
 // flown: a number is not finite, a spin neither +1 nor -1, or the rotors cannot make every torque.
 int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const int* spins, const kphi_real* drag_scale);
 // At control rate: thrusts f = A^-1 wrench within the limits, wrench = [thrust N, roll, pitch, yaw N m], A's columns
-// [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (no further than to
-// assured_yaw), collective thrust, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_..,
-// KPHI_DEMAND_NAN), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
+// [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (down to assured_yaw),
+// collective thrust, assured yaw, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_.., KPHI_DEMAND_NAN,
+// KPHI_MIX_UNFINISHED: the search ended early), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
 int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n,
              const kphi_real* largest_n, kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]);
 

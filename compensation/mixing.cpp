@@ -11,11 +11,10 @@ constexpr Real kLargestDemand = Real(1e9);  // N, N m: beyond it the arithmetic 
 constexpr Real kLargestDragScale = Real(1e6), kSmallestDragScale = Real(1e-6);
 constexpr Real kSmallestTorque = Real(1e-9);  // N m per N
 constexpr bool kDouble = sizeof(Real) == sizeof(double);
-constexpr int kTorqueIterations = 10;
-constexpr int kSearches = 4;
-constexpr int kHalvings = 20;
+constexpr int kTorqueIterations = kDouble ? 6 : 4;
+constexpr int kSearches = 2;
+constexpr int kCorrections = 6;
 constexpr Real kYawTolerance = kDouble ? Real(1e-13) : Real(1e-5);
-constexpr Real kTorqueTolerance = kDouble ? Real(1e-9) : Real(1e-5);
 /// Shares of a vehicle's sizes below which its rotors count as unable to make a torque.
 constexpr Real kFlat = Real(1e-6);
 /// How far, relative to what the rotors can give, a demand may be missed that is only rounding.
@@ -75,6 +74,15 @@ Real size_of(const Row& row) noexcept {
   Real most = 0;
   for (const Real value : row) most = std::max(most, std::fabs(value));
   return most;
+}
+
+/// Limits far beyond anything that matters would hide in their rounding what does.
+WithinLimits::Limits in_reach(WithinLimits::Limits limits, const Row& wanted) noexcept {
+  constexpr Real kFar = kDouble ? Real(1e3) : Real(1e2);
+  const Real most = kFar * std::max(size_of(wanted), size_of(limits.low));
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    limits.high[i] = std::max(std::min(limits.high[i], most), limits.low[i]);
+  return limits;
 }
 
 Row negative(Row row) noexcept {
@@ -149,6 +157,19 @@ Row Mixer::yaw_arms(const Row& thrusts) const noexcept {
   return arms;
 }
 
+Real Mixer::yaw_of(const Row& thrusts, Row& slopes) const noexcept {
+  const Real per_newton = drag_.per_newton.value(), most = 2 * per_newton, least = per_newton / 2;
+  Real yaw = 0;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const Real bend = drag_.per_square_newton * drag_scale_[i] * std::max(thrusts[i], Real(0)),
+               torque = per_newton + bend;
+    const Real held = std::min(std::max(torque, least), most), arm = spins_[i] * drag_scale_[i];
+    yaw += arm * held * thrusts[i];
+    slopes[i] = arm * (torque < least || torque > most ? held : torque + bend);
+  }
+  return yaw;
+}
+
 Row Mixer::torque_free(const Row& arms) const noexcept {
   Real thrust = 0;
   const Real roll = dot(y_, arms), pitch = -dot(x_, arms);
@@ -160,55 +181,56 @@ Row Mixer::torque_free(const Row& arms) const noexcept {
   return rest;
 }
 
-void Mixer::add_yaw(Row& thrusts, Real yaw, Row& arms) const noexcept {
-  const auto give = [&](const Row& free) { return moved(thrusts, (yaw - dot(arms, thrusts)) / dot(free, free), free); };
-  Row given = give(free_);
-  for (int i = 0; i < kTorqueIterations && std::fabs(drag_.per_square_newton) > 0; ++i) {
-    arms = yaw_arms(given);
-    const Row free = torque_free(arms);
-    if (std::fabs(dot(arms, given) - yaw) <= kYawTolerance * dot(free, free)) break;
-    given = give(free);
+void Mixer::add_yaw(Row& thrusts, Real yaw, const WithinLimits::Limits& limits) const noexcept {
+  const Row without = thrusts;
+  Row along = free_, slopes = arms_;
+  Real share = (yaw - dot(arms_, without)) / dot(along, along);
+  thrusts = moved(without, share, along);
+  if (!bends()) return;
+  if (rotors() > 4) {  // Four have one direction for it.
+    const Row arms = yaw_arms(thrusts);
+    along = torque_free(arms);
+    share = (yaw - dot(arms, without)) / dot(along, along);
+    thrusts = moved(without, share, along);
   }
-  thrusts = given;
+  for (int i = 0; i < kTorqueIterations; ++i) {
+    const Real off = yaw - yaw_of(thrusts, slopes), steep = dot(slopes, along);
+    if (std::fabs(off) <= kYawTolerance * std::fabs(steep) || !(std::fabs(steep) > 0)) return;
+    share += off / steep;
+    thrusts = moved(without, share, along);
+    if (i > 0 && !within(thrusts, limits)) return;  // to be searched for
+  }
+}
+
+void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured) const noexcept {
+  const Range kept = yaw_from(assured, asked.yaw);
+  const int searches = bends() ? kSearches : 1;
+  Row slopes(rotors());
+  for (int i = 0; i < searches; ++i) {
+    const Real now = yaw_of(search.thrusts(), slopes);
+    search.set_yaw(slopes, now);
+    search.reach(WithinLimits::Goal::yaw, kept);
+    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
+    search.reach(WithinLimits::Goal::yaw, {asked.yaw, asked.yaw});
+    if (i == 0) search.ease();
+    for (int j = 0; bends() && j < (i + 1 < searches ? 1 : kCorrections); ++j) {
+      if (!search.correct_yaw(search.yaw() - yaw_of(search.thrusts(), slopes))) break;
+    }
+  }
 }
 
 Row Mixer::give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
-                   int& steps) const noexcept {
-  const Range promised = yaw_from(0, asked.yaw), kept = yaw_from(assured, asked.yaw);
-  const auto search_with = [&](const Row& arms) {
-    WithinLimits search(held, wanted);
-    if (yaws_) search.reach(arms, promised, WithinLimits::Keep::within);
-    search.reach(y_, negative(x_), asked.roll, asked.pitch);
-    if (yaws_) search.reach(arms, kept, WithinLimits::Keep::within);
-    search.reach(Row(rotors(), 1), {asked.thrust, asked.thrust});
-    if (yaws_) search.reach(arms, {asked.yaw, asked.yaw}, WithinLimits::Keep::within);
-    steps += search.steps();
-    return search.thrusts();
-  };
-  Row arms = yaw_arms(wanted), given = search_with(arms);
-  if (!yaws_ || !(std::fabs(drag_.per_square_newton) > 0)) return given;
-  // What yaw is out of its promise by, with the torque of these thrusts.
-  const auto out_by = [&](const Row& thrusts) {
-    const Real yaw = dot(yaw_arms(thrusts), thrusts);
-    return std::fabs(yaw - std::min(std::max(yaw, promised.low), promised.high));
-  };
-  Row safe = held.low;
-  for (int i = 1; i < kSearches; ++i) {
-    const Row next = yaw_arms(given);
-    if (std::fabs(dot(next, given) - dot(arms, given)) <= kTorqueTolerance * size_of(arms) * size_of(given)) break;
-    if (!(out_by(given) > 0)) safe = given;
-    arms = next;
-    given = search_with(arms);
+                   MixedThrusts& mixed) const noexcept {
+  WithinLimits search(in_reach(held, wanted), wanted, y_, negative(x_), std::max(size_of(x_), size_of(y_)));
+  search.reach_roll_pitch(asked.roll, asked.pitch);
+  if (yaws_) {
+    search_yaw_and_thrust(search, asked, assured);
+  } else {
+    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
   }
-  // It may go to and fro between two sets of limits, or end a little outside. Then towards what keeps the promise.
-  if (!(out_by(given) > 0)) return given;
-  Real good = 1, bad = 0;
-  const auto between = [&](Real share) { return moved(moved(given, -share, given), share, safe); };
-  for (int i = 0; i < kHalvings; ++i) {
-    const Real middle = (good + bad) / 2;
-    (out_by(between(middle)) > 0 ? bad : good) = middle;
-  }
-  return between(good);
+  mixed.steps = search.steps();
+  mixed.concessions = mixed.concessions.with(Concession::unfinished, search.cut_short());
+  return search.thrusts();
 }
 
 MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, NewtonMetres assured_yaw) const noexcept {
@@ -221,12 +243,10 @@ MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, Newton
   for (std::size_t i = 0; i < rotors(); ++i) {
     wanted[i] = thrust * per_thrust_[i] + roll * per_roll_[i] + pitch * per_pitch_[i];
   }
-  Row arms = arms_;
-  if (yaws_) add_yaw(wanted, yaw, arms);
+  if (yaws_) add_yaw(wanted, yaw, held);
 
   MixedThrusts mixed;
-  if (!within(wanted, held))
-    wanted = give_up(wanted, {thrust, roll, pitch, yaw}, held, assured_yaw.value(), mixed.steps);
+  if (!within(wanted, held)) wanted = give_up(wanted, {thrust, roll, pitch, yaw}, held, assured_yaw.value(), mixed);
   mixed.thrusts = Rotors<Newtons>(rotors());
   Real most = 1;
   for (std::size_t i = 0; i < rotors(); ++i) {
@@ -236,20 +256,77 @@ MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, Newton
   mixed.achieved = wrench_of(mixed.thrusts);
   const auto missed = [&](Real got, Real asked, Real arm) { return std::fabs(got - asked) > kRounding * most * arm; };
   const Real arm = std::max(size_of(x_), size_of(y_));
-  mixed.concessions = Concessions()
-                          .with(Concession::demand_nan, odd)
+  mixed.concessions = mixed.concessions.with(Concession::demand_nan, odd)
                           .with(Concession::thrust, missed(mixed.achieved.thrust.value(), thrust, 1))
                           .with(Concession::roll_pitch, missed(mixed.achieved.roll.value(), roll, arm) ||
                                                             missed(mixed.achieved.pitch.value(), pitch, arm))
-                          .with(Concession::yaw, missed(mixed.achieved.yaw.value(), yaw, size_of(arms)));
+                          .with(Concession::yaw, missed(mixed.achieved.yaw.value(), yaw, size_of(arms_)));
   return mixed;
 }
 
 Wrench Mixer::wrench_of(const Rotors<Newtons>& thrusts) const noexcept {
-  Row f(rotors());
+  Row f(rotors()), slopes(rotors());
+  Real sum = 0, roll = 0, pitch = 0;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
+    sum += f[i];
+    roll += y_[i] * f[i];
+    pitch -= x_[i] * f[i];
+  }
+  return {Newtons(sum), NewtonMetres(roll), NewtonMetres(pitch), NewtonMetres(yaw_of(f, slopes))};
+}
+
+namespace {
+
+/// Of the first `size` of these columns, with the rows from `row` on.
+Real determinant(const Real (*columns[4])[4], std::size_t row, std::size_t size) noexcept {
+  if (size == 1) return (*columns[0])[row];
   Real sum = 0;
-  for (std::size_t i = 0; i < rotors(); ++i) sum += f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
-  return {Newtons(sum), NewtonMetres(dot(y_, f)), NewtonMetres(-dot(x_, f)), NewtonMetres(dot(yaw_arms(f), f))};
+  for (std::size_t k = 0; k < size; ++k) {
+    const Real(*others[4])[4];
+    for (std::size_t i = 0, to = 0; i < size; ++i) {
+      if (i != k) others[to++] = columns[i];
+    }
+    const Real part = (*columns[k])[row] * determinant(others, row + 1, size - 1);
+    sum += k % 2 == 0 ? part : -part;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Real condition_of(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
+  constexpr Real kNoise = Real(1e-7);
+  const std::size_t count = layout.hubs.size();
+  Real columns[kMostRotors][4], reach = 0, arm = 0, least = 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    reach = std::max({reach, std::fabs(layout.hubs[i].x.value()), std::fabs(layout.hubs[i].y.value())});
+    arm = std::max(arm, i < drag_scale.size() ? drag_scale[i] : Real(1));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real scale = i < drag_scale.size() ? drag_scale[i] : Real(1);
+    columns[i][0] = static_cast<Real>(layout.spins[i]) * scale / arm;
+    columns[i][1] = layout.hubs[i].y.value() / reach;
+    columns[i][2] = -layout.hubs[i].x.value() / reach;
+    columns[i][3] = 1;
+  }
+  // Every choice of rotors is a number with a bit for each.
+  for (unsigned chosen = 1; chosen < 1u << count; ++chosen) {
+    const Real(*some[4])[4];
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < count && size <= 4; ++i) {
+      if ((chosen >> i & 1u) == 0) continue;
+      if (size < 4) some[size] = &columns[i];
+      ++size;
+    }
+    if (size < 2 || size > 4) continue;
+    // Two by roll and pitch, three by these and yaw or thrust, four by all.
+    for (std::size_t row = size == 3 || size == 4 ? 0 : 1; row + size <= 4 && row < 2; ++row) {
+      const Real size_of_it = std::fabs(determinant(some, row, size));
+      if (size_of_it > kNoise) least = std::min(least, size_of_it);
+    }
+  }
+  return 1 / least;
 }
 
 }  // namespace kphi::compensation
