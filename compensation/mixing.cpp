@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -11,7 +13,7 @@ constexpr Real kLargestDemand = Real(1e9);  // N, N m: beyond it the arithmetic 
 constexpr Real kLargestDragScale = Real(1e6), kSmallestDragScale = Real(1e-6);
 constexpr Real kSmallestTorque = Real(1e-9);  // N m per N
 constexpr bool kDouble = sizeof(Real) == sizeof(double);
-constexpr int kTorqueIterations = kDouble ? 6 : 4;
+constexpr int kTorqueIterations = kDouble ? 8 : 5;
 constexpr int kSearches = 2;
 constexpr int kCorrections = 6;
 constexpr Real kYawTolerance = kDouble ? Real(1e-13) : Real(1e-5);
@@ -20,40 +22,29 @@ constexpr Real kFlat = Real(1e-6);
 /// How far, relative to what the rotors can give, a demand may be missed that is only rounding.
 constexpr Real kRounding = kDouble ? Real(1e-9) : Real(1e-4);
 
-/// f = from + distance along.
-Row moved(const Row& from, Real distance, const Row& along) noexcept {
-  Row result = from;
-  for (std::size_t i = 0; i < result.size(); ++i) result[i] += distance * along[i];
-  return result;
-}
-
-bool usable(const RotorLayout& layout, const Row& drag_scale) noexcept {
+bool usable(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
   const std::size_t count = layout.hubs.size();
-  if (count < kFewestRotors || layout.spins.size() != count || drag_scale.size() != count) return false;
+  if (count < kFewestRotors || layout.spins.size() != count) return false;
+  if (drag_scale.size() != 0 && drag_scale.size() != count) return false;
   for (std::size_t i = 0; i < count; ++i) {
     const Real x = layout.hubs[i].x.value(), y = layout.hubs[i].y.value();
     if (!(std::fabs(x) < Real(1e6)) || !(std::fabs(y) < Real(1e6))) return false;
     if (layout.spins[i] != 1 && layout.spins[i] != -1) return false;
-    if (!(drag_scale[i] > kSmallestDragScale) || !(drag_scale[i] < kLargestDragScale)) return false;
+    const Real scale = drag_scale.size() == 0 ? Real(1) : drag_scale[i];
+    if (!(scale > kSmallestDragScale) || !(scale < kLargestDragScale)) return false;
   }
   return true;
 }
 
 Real within_reason(Real demand, bool& odd) noexcept {
-  odd = odd || std::isnan(demand);
-  return std::isnan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
+  odd = odd || is_nan(demand);
+  return is_nan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
 }
 
-WithinLimits::Limits within_reason(const ThrustLimits& limits, std::size_t count, bool& odd) noexcept {
-  WithinLimits::Limits result{Row(count), Row(count)};
-  for (std::size_t i = 0; i < count; ++i) {
-    const Real low = i < limits.smallest.size() ? limits.smallest[i].value() : Real(0);
-    const Real high = i < limits.largest.size() ? limits.largest[i].value() : Real(0);
-    odd = odd || !(low <= high);
-    result.low[i] = low > 0 ? std::min(low, kLargestDemand) : Real(0);
-    result.high[i] = high > result.low[i] ? std::min(high, kLargestDemand) : result.low[i];
-  }
-  return result;
+void within_reason(std::size_t i, Real low, Real high, WithinLimits::Limits& held, bool& odd) noexcept {
+  odd = odd || is_nan(low) || is_nan(high) || low > high;
+  held.low[i] = low > 0 ? std::min(low, kLargestDemand) : Real(0);
+  held.high[i] = high > held.low[i] ? std::min(high, kLargestDemand) : held.low[i];
 }
 
 bool within(const Row& thrusts, const WithinLimits::Limits& limits) noexcept {
@@ -77,67 +68,68 @@ Real size_of(const Row& row) noexcept {
 }
 
 /// Limits far beyond anything that matters would hide in their rounding what does.
-WithinLimits::Limits in_reach(WithinLimits::Limits limits, const Row& wanted) noexcept {
+void keep_in_reach(WithinLimits::Limits& limits, const Row& wanted) noexcept {
   constexpr Real kFar = kDouble ? Real(1e3) : Real(1e2);
   const Real most = kFar * std::max(size_of(wanted), size_of(limits.low));
   for (std::size_t i = 0; i < wanted.size(); ++i)
     limits.high[i] = std::max(std::min(limits.high[i], most), limits.low[i]);
-  return limits;
-}
-
-Row negative(Row row) noexcept {
-  for (Real& value : row) value = -value;
-  return row;
 }
 
 }  // namespace
 
 std::optional<Mixer> Mixer::build(const RotorLayout& layout, DragTorque drag) noexcept {
+  std::optional<Mixer> mixer;
+  if (!mixer.emplace().rebuild(layout, drag)) mixer.reset();
+  return mixer;
+}
+
+bool Mixer::rebuild(const RotorLayout& layout, DragTorque drag) noexcept {
   const Real per_newton = drag.per_newton.value();
   if (!(per_newton > kSmallestTorque) || !(per_newton < Real(1e6)) ||
       !(std::fabs(drag.per_square_newton) < Real(1e6))) {
-    return std::nullopt;
+    return false;
   }
-  Mixer mixer(drag);
-  if (!mixer.set_layout(layout)) return std::nullopt;
-  return mixer;
+  const DragTorque before = drag_;
+  drag_ = drag;
+  if (set_layout(layout)) return true;
+  drag_ = before;
+  return false;
 }
 
 bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
   const std::size_t count = layout.hubs.size();
-  Mixer next(drag_);
-  next.drag_scale_ = drag_scale.size() == 0 ? Row(count, 1) : drag_scale;
-  if (!usable(layout, next.drag_scale_)) return false;
-  next.x_ = next.y_ = next.spins_ = Row(count);
+  if (!usable(layout, drag_scale)) return false;
+  Mixer next;
+  next.drag_ = drag_;
+  next.resize(count);
   const Real share = 1 / static_cast<Real>(count);
   Real mean_x = 0, mean_y = 0;
   for (std::size_t i = 0; i < count; ++i) {
     next.x_[i] = layout.hubs[i].x.value();
     next.y_[i] = layout.hubs[i].y.value();
+    next.drag_scale_[i] = drag_scale.size() == 0 ? Real(1) : drag_scale[i];
     next.spins_[i] = static_cast<Real>(layout.spins[i]);
     mean_x += next.x_[i] * share;
     mean_y += next.y_[i] * share;
   }
-  Row x = next.x_, y = next.y_;  // about their mean
-  Real reach = 0, xx = 0, xy = 0, yy = 0;
+  Real reach = 0, xx = 0, xy = 0, yy = 0;  // about their mean
   for (std::size_t i = 0; i < count; ++i) {
-    x[i] -= mean_x;
-    y[i] -= mean_y;
-    xx += x[i] * x[i];
-    xy += x[i] * y[i];
-    yy += y[i] * y[i];
-    reach = std::max({reach, std::fabs(x[i]), std::fabs(y[i])});
+    const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
+    xx += x * x;
+    xy += x * y;
+    yy += y * y;
+    reach = std::max({reach, std::fabs(x), std::fabs(y)});
   }
   const Real determinant = xx * yy - xy * xy;
   if (!(determinant > kFlat * reach * reach * reach * reach)) return false;
   // The least squares of all thrusts that make a roll about the mean are along y and x, the thrust is 1/n of each.
-  next.per_thrust_ = next.per_roll_ = next.per_pitch_ = Row(count);
   for (std::size_t i = 0; i < count; ++i) {
-    next.per_roll_[i] = (xx * y[i] - xy * x[i]) / determinant;
-    next.per_pitch_[i] = (xy * y[i] - yy * x[i]) / determinant;
+    const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
+    next.per_roll_[i] = (xx * y - xy * x) / determinant;
+    next.per_pitch_[i] = (xy * y - yy * x) / determinant;
     next.per_thrust_[i] = share - mean_y * next.per_roll_[i] + mean_x * next.per_pitch_[i];
+    next.arms_[i] = next.spins_[i] * next.drag_scale_[i] * drag_.per_newton.value();
   }
-  next.arms_ = next.yaw_arms(Row(count));
   next.free_ = next.torque_free(next.arms_);
   const Real square = dot(next.free_, next.free_);
   next.yaws_ = count > kFewestRotors;
@@ -146,24 +138,18 @@ bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale
   return true;
 }
 
-Row Mixer::yaw_arms(const Row& thrusts) const noexcept {
-  const Real per_newton = drag_.per_newton.value();
-  Row arms(rotors());
-  for (std::size_t i = 0; i < rotors(); ++i) {
-    const Real uncovered = drag_scale_[i] * std::max(thrusts[i], Real(0));
-    const Real torque = per_newton + drag_.per_square_newton * uncovered;
-    arms[i] = spins_[i] * drag_scale_[i] * std::min(std::max(torque, per_newton / 2), 2 * per_newton);
-  }
-  return arms;
+void Mixer::resize(std::size_t count) noexcept {
+  for (Row* row : {&x_, &y_, &per_thrust_, &per_roll_, &per_pitch_, &arms_, &free_, &drag_scale_, &spins_})
+    *row = Row(count);
 }
 
 Real Mixer::yaw_of(const Row& thrusts, Row& slopes) const noexcept {
   const Real per_newton = drag_.per_newton.value(), most = 2 * per_newton, least = per_newton / 2;
   Real yaw = 0;
   for (std::size_t i = 0; i < rotors(); ++i) {
-    const Real bend = drag_.per_square_newton * drag_scale_[i] * std::max(thrusts[i], Real(0)),
-               torque = per_newton + bend;
-    const Real held = std::min(std::max(torque, least), most), arm = spins_[i] * drag_scale_[i];
+    const Real bend = drag_.per_square_newton * drag_scale_[i] * std::max(thrusts[i], Real(0));
+    const Real torque = per_newton + bend, held = std::min(std::max(torque, least), most);
+    const Real arm = spins_[i] * drag_scale_[i];
     yaw += arm * held * thrusts[i];
     slopes[i] = arm * (torque < least || torque > most ? held : torque + bend);
   }
@@ -185,95 +171,112 @@ void Mixer::add_yaw(Row& thrusts, Real yaw, const WithinLimits::Limits& limits) 
   const Row without = thrusts;
   Row along = free_, slopes = arms_;
   Real share = (yaw - dot(arms_, without)) / dot(along, along);
-  thrusts = moved(without, share, along);
-  if (!bends()) return;
-  if (rotors() > 4) {  // Four have one direction for it.
-    const Row arms = yaw_arms(thrusts);
-    along = torque_free(arms);
-    share = (yaw - dot(arms, without)) / dot(along, along);
-    thrusts = moved(without, share, along);
-  }
   for (int i = 0; i < kTorqueIterations; ++i) {
-    const Real off = yaw - yaw_of(thrusts, slopes), steep = dot(slopes, along);
-    if (std::fabs(off) <= kYawTolerance * std::fabs(steep) || !(std::fabs(steep) > 0)) return;
+    for (std::size_t j = 0; j < rotors(); ++j) thrusts[j] = without[j] + share * along[j];
+    if (!bends() || (i > 1 && !within(thrusts, limits))) return;  // beyond the limits it is to be searched for
+    const Real off = yaw - yaw_of(thrusts, slopes);
+    // Four rotors have one direction for it, more of them that of the slopes which they have about there.
+    if (i == 0 && rotors() > 4) along = torque_free(slopes);
+    const Real steep = dot(slopes, along);
+    if ((i > 0 && std::fabs(off) <= kYawTolerance * std::fabs(steep)) || !(std::fabs(steep) > 0)) return;
     share += off / steep;
-    thrusts = moved(without, share, along);
-    if (i > 0 && !within(thrusts, limits)) return;  // to be searched for
   }
 }
 
-void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured) const noexcept {
+void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured, Row& thrusts) const noexcept {
   const Range kept = yaw_from(assured, asked.yaw);
   const int searches = bends() ? kSearches : 1;
   Row slopes(rotors());
   for (int i = 0; i < searches; ++i) {
-    const Real now = yaw_of(search.thrusts(), slopes);
+    search.thrusts(thrusts);
+    const Real now = yaw_of(thrusts, slopes);
     search.set_yaw(slopes, now);
     search.reach(WithinLimits::Goal::yaw, kept);
     search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
     search.reach(WithinLimits::Goal::yaw, {asked.yaw, asked.yaw});
     if (i == 0) search.ease();
     for (int j = 0; bends() && j < (i + 1 < searches ? 1 : kCorrections); ++j) {
-      if (!search.correct_yaw(search.yaw() - yaw_of(search.thrusts(), slopes))) break;
+      search.thrusts(thrusts);
+      if (!search.correct_yaw(search.yaw() - yaw_of(thrusts, slopes))) break;
     }
   }
 }
 
-Row Mixer::give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
-                   MixedThrusts& mixed) const noexcept {
-  WithinLimits search(in_reach(held, wanted), wanted, y_, negative(x_), std::max(size_of(x_), size_of(y_)));
+void Mixer::give_up(Row& thrusts, const Asked& asked, WithinLimits::Limits& held, Real assured,
+                    MixedThrusts& mixed) const noexcept {
+  keep_in_reach(held, thrusts);
+  WithinLimits search(held, thrusts, x_, y_, std::max(size_of(x_), size_of(y_)));
   search.reach_roll_pitch(asked.roll, asked.pitch);
   if (yaws_) {
-    search_yaw_and_thrust(search, asked, assured);
+    search_yaw_and_thrust(search, asked, assured, thrusts);
   } else {
     search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
   }
   mixed.steps = search.steps();
   mixed.concessions = mixed.concessions.with(Concession::unfinished, search.cut_short());
-  return search.thrusts();
+  search.thrusts(thrusts);
 }
 
 MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, NewtonMetres assured_yaw) const noexcept {
+  Real smallest[kMostRotors], largest[kMostRotors];
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    smallest[i] = i < limits.smallest.size() ? limits.smallest[i].value() : Real(0);
+    largest[i] = i < limits.largest.size() ? limits.largest[i].value() : Real(0);
+  }
+  return mix(demand, smallest, largest, assured_yaw);
+}
+
+MixedThrusts Mixer::mix(const Wrench& demand, const Real* smallest, const Real* largest,
+                        NewtonMetres assured_yaw) const noexcept {
   bool odd = false;
-  const Real thrust = within_reason(demand.thrust.value(), odd), roll = within_reason(demand.roll.value(), odd),
-             pitch = within_reason(demand.pitch.value(), odd), yaw = within_reason(demand.yaw.value(), odd);
-  const WithinLimits::Limits held = within_reason(limits, rotors(), odd);
+  WithinLimits::Limits held{Row(rotors()), Row(rotors())};
+  for (std::size_t i = 0; i < rotors(); ++i) within_reason(i, smallest[i], largest[i], held, odd);
+  Real asked[] = {demand.thrust.value(), demand.roll.value(), demand.pitch.value(), demand.yaw.value()};
+  for (Real& one : asked) one = within_reason(one, odd);
 
   Row wanted(rotors());
   for (std::size_t i = 0; i < rotors(); ++i) {
-    wanted[i] = thrust * per_thrust_[i] + roll * per_roll_[i] + pitch * per_pitch_[i];
+    wanted[i] = asked[0] * per_thrust_[i] + asked[1] * per_roll_[i] + asked[2] * per_pitch_[i];
   }
-  if (yaws_) add_yaw(wanted, yaw, held);
+  if (yaws_) add_yaw(wanted, asked[3], held);
 
   MixedThrusts mixed;
-  if (!within(wanted, held)) wanted = give_up(wanted, {thrust, roll, pitch, yaw}, held, assured_yaw.value(), mixed);
-  mixed.thrusts = Rotors<Newtons>(rotors());
+  if (!within(wanted, held))
+    give_up(wanted, {asked[0], asked[1], asked[2], asked[3]}, held, assured_yaw.value(), mixed);
+  mixed.thrusts.resize(rotors());
   Real most = 1;
   for (std::size_t i = 0; i < rotors(); ++i) {
     mixed.thrusts[i] = Newtons(wanted[i]);
     most = std::max(most, std::fabs(wanted[i]));
   }
-  mixed.achieved = wrench_of(mixed.thrusts);
-  const auto missed = [&](Real got, Real asked, Real arm) { return std::fabs(got - asked) > kRounding * most * arm; };
-  const Real arm = std::max(size_of(x_), size_of(y_));
-  mixed.concessions = mixed.concessions.with(Concession::demand_nan, odd)
-                          .with(Concession::thrust, missed(mixed.achieved.thrust.value(), thrust, 1))
-                          .with(Concession::roll_pitch, missed(mixed.achieved.roll.value(), roll, arm) ||
-                                                            missed(mixed.achieved.pitch.value(), pitch, arm))
-                          .with(Concession::yaw, missed(mixed.achieved.yaw.value(), yaw, size_of(arms_)));
+  mixed.achieved = wrench_of(wanted);
+  const Real rounding = kRounding * most, arm = rounding * std::max(size_of(x_), size_of(y_));
+  const bool thrust = std::fabs(mixed.achieved.thrust.value() - asked[0]) > rounding;
+  const bool roll_pitch = std::fabs(mixed.achieved.roll.value() - asked[1]) > arm ||
+                          std::fabs(mixed.achieved.pitch.value() - asked[2]) > arm;
+  const bool yaw = std::fabs(mixed.achieved.yaw.value() - asked[3]) > rounding * size_of(arms_);
+  mixed.concessions = mixed.concessions.with(Concession::thrust, thrust)
+                          .with(Concession::roll_pitch, roll_pitch)
+                          .with(Concession::yaw, yaw)
+                          .with(Concession::demand_nan, odd);
   return mixed;
 }
 
 Wrench Mixer::wrench_of(const Rotors<Newtons>& thrusts) const noexcept {
-  Row f(rotors()), slopes(rotors());
+  Row f(rotors());
+  for (std::size_t i = 0; i < rotors(); ++i) f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
+  return wrench_of(f);
+}
+
+Wrench Mixer::wrench_of(const Row& thrusts) const noexcept {
+  Row slopes(rotors());
   Real sum = 0, roll = 0, pitch = 0;
   for (std::size_t i = 0; i < rotors(); ++i) {
-    f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
-    sum += f[i];
-    roll += y_[i] * f[i];
-    pitch -= x_[i] * f[i];
+    sum += thrusts[i];
+    roll += y_[i] * thrusts[i];
+    pitch -= x_[i] * thrusts[i];
   }
-  return {Newtons(sum), NewtonMetres(roll), NewtonMetres(pitch), NewtonMetres(yaw_of(f, slopes))};
+  return {Newtons(sum), NewtonMetres(roll), NewtonMetres(pitch), NewtonMetres(yaw_of(thrusts, slopes))};
 }
 
 namespace {

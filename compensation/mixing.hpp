@@ -67,6 +67,10 @@ struct MixedThrusts {
 
 class Mixer {
  public:
+  /// Of no rotors: rebuild() makes one of it.
+  Mixer() noexcept = default;
+  /// In place, for small stacks. False, and nothing is changed, where build() gives none.
+  bool rebuild(const RotorLayout& layout, DragTorque drag) noexcept;
   /// Nothing if the layout cannot be flown (see set_layout), or `drag` is not finite or its per_newton not above 1e-9.
   [[nodiscard]] static std::optional<Mixer> build(const RotorLayout& layout, DragTorque drag) noexcept;
 
@@ -89,6 +93,10 @@ class Mixer {
   [[nodiscard]] MixedThrusts mix(const Wrench& demand, const ThrustLimits& limits,
                                  NewtonMetres assured_yaw = NewtonMetres(0)) const noexcept;
 
+  /// The same on arrays, with a limit [N] for each rotor.
+  [[nodiscard]] MixedThrusts mix(const Wrench& demand, const Real* smallest, const Real* largest,
+                                 NewtonMetres assured_yaw) const noexcept;
+
   /// A f, the wrench of these thrusts [N], with κ(f).
   [[nodiscard]] Wrench wrench_of(const Rotors<Newtons>& thrusts) const noexcept;
   /// 3 to 8.
@@ -97,10 +105,10 @@ class Mixer {
   [[nodiscard]] bool yaws() const noexcept { return yaws_; }
 
  private:
-  explicit Mixer(DragTorque drag) noexcept : drag_(drag) {}
-  [[nodiscard]] Row yaw_arms(const Row& thrusts) const noexcept;
+  void resize(std::size_t count) noexcept;
   /// Of these thrusts, and by how much it changes with each [m].
   [[nodiscard]] Real yaw_of(const Row& thrusts, Row& slopes) const noexcept;
+  [[nodiscard]] Wrench wrench_of(const Row& thrusts) const noexcept;
   [[nodiscard]] bool bends() const noexcept { return drag_.per_square_newton > 0 || drag_.per_square_newton < 0; }
   /// The part of `arms` that makes neither thrust, roll nor pitch: the least thrusts for yaw are along it.
   [[nodiscard]] Row torque_free(const Row& arms) const noexcept;
@@ -110,15 +118,15 @@ class Mixer {
   struct Asked {
     Real thrust, roll, pitch, yaw;
   };
-  void search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured) const noexcept;
-  /// Within the limits, by the order of mix(). Tells `mixed` of the search.
-  [[nodiscard]] Row give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
-                            MixedThrusts& mixed) const noexcept;
+  void search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured, Row& thrusts) const noexcept;
+  /// Brings `thrusts` within the limits by the order of mix(). Tells `mixed` of the search; narrows the limits.
+  void give_up(Row& thrusts, const Asked& asked, WithinLimits::Limits& held, Real assured,
+               MixedThrusts& mixed) const noexcept;
 
-  DragTorque drag_;
+  DragTorque drag_{};
   Row x_, y_;                              // hubs [m]
   Row per_thrust_, per_roll_, per_pitch_;  // the least thrusts for one newton or newton metre of each
-  Row arms_, free_;                        // yaw_arms() and torque_free() of rotors at rest
+  Row arms_, free_;                        // by what yaw changes with each thrust at rest, and its torque_free()
   Row drag_scale_;
   Row spins_;
   bool yaws_ = true;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -17,16 +19,15 @@ constexpr Real kRounding = kDouble ? Real(1e-13) : Real(1e-6);
 constexpr Real kFree = Real(1e30);
 /// Steps on the spot after which the order of the variables decides (Bland's rule): so it cannot go round in a circle.
 constexpr int kPatience = 3;
-constexpr int kEasings = 5;
+constexpr int kEasings = 4;
 constexpr Real kEased = kDouble ? Real(1e-9) : Real(3e-5);
 
 Real nearest(Real value, Range range) noexcept { return std::min(std::max(value, range.low), range.high); }
 
 }  // namespace
 
-WithinLimits::WithinLimits(const Limits& limits, const Row& start, const Row& roll, const Row& pitch,
-                           Real reach) noexcept
-    : rotors_(start.size()), columns_count_(start.size()), reach_(reach) {
+WithinLimits::WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Real reach) noexcept
+    : limits_(limits), rotors_(start.size()), columns_count_(start.size()), reach_(reach) {
   Real largest = 0;
   for (std::size_t g = kMostRotors; g < kVariables; ++g) {
     low_[g] = -kFree;
@@ -34,12 +35,12 @@ WithinLimits::WithinLimits(const Limits& limits, const Row& start, const Row& ro
     rows_[g - kMostRotors] = static_cast<std::uint8_t>(g);
   }
   for (std::size_t i = 0; i < columns_count_; ++i) {
-    low_[i] = lowest_[i] = limits.low[i];
-    high_[i] = highest_[i] = limits.high[i];
+    low_[i] = limits.low[i];
+    high_[i] = limits.high[i];
     largest = std::max(largest, high_[i]);
     const Real f = values_[i] = nearest(start[i], {low_[i], high_[i]});
-    entries_[0][i] = roll[i] / reach;
-    entries_[1][i] = pitch[i] / reach;
+    entries_[0][i] = y[i] / reach;
+    entries_[1][i] = -x[i] / reach;
     entries_[2][i] = 1;
     for (std::size_t row = 0; row < 3; ++row) values_[kMostRotors + row] += entries_[row][i] * f;
     columns_[i] = static_cast<std::uint8_t>(i);
@@ -109,8 +110,8 @@ void WithinLimits::reach_roll_pitch(Real roll, Real pitch) noexcept {
   approach(kMostRotors + first, {point[first], point[first]});
   approach(kMostRotors + 1 - first, {point[1 - first], point[1 - first]});
   for (std::size_t i = 0; i < rotors_; ++i) {
-    lowest_[i] = low_[i];
-    highest_[i] = high_[i];
+    limits_.low[i] = low_[i];
+    limits_.high[i] = high_[i];
   }
   forget_fixed();
 }
@@ -136,8 +137,8 @@ void WithinLimits::set_yaw(const Row& arms, Real now) noexcept {
   constexpr std::size_t yaw = index(Goal::yaw), thrust = index(Goal::thrust);
   const bool first = !(yaw_scale_ > 0);
   for (std::size_t i = 0; i < rotors_; ++i) {
-    low_[i] = lowest_[i];
-    high_[i] = highest_[i];
+    low_[i] = limits_.low[i];
+    high_[i] = limits_.high[i];
     if (first) yaw_scale_ = std::max(yaw_scale_, std::fabs(arms[i]));
   }
   low_[thrust] = low_[yaw] = -kFree;
@@ -247,22 +248,26 @@ std::size_t WithinLimits::entering(std::size_t row, Real need, bool careful) con
   return best;
 }
 
+Real WithinLimits::distance(std::size_t variable, Real change) const noexcept {
+  const Real size = std::fabs(change);
+  return size > kZero ? std::max(room(variable, change > 0), Real(0)) / size : kFree;
+}
+
 std::size_t WithinLimits::blocking(std::size_t column, Real& by, std::size_t but, bool careful) const noexcept {
+  const Real sign = by > 0 ? Real(1) : Real(-1);
   std::size_t first = kGoals;
-  Real most = std::fabs(by), steepest = 0;
+  Real most = by * sign, steepest = 0, tie = 0;
   for (std::size_t i = 0; i < rows_count_; ++i) {
-    const Real entry = entries_[i][column], size = std::fabs(entry);
-    if (i == but || !(size > kZero)) continue;
-    const Real share = std::max(room(rows_[i], (entry > 0) == (by > 0)), Real(0)) / size;
+    const Real entry = entries_[i][column] * sign, share = distance(rows_[i], entry), size = std::fabs(entry);
     // Of those that meet their limits together the one that bends the rest the least.
     const bool better = first < kGoals && (careful ? rows_[i] < rows_[first] : size > steepest);
-    const Real tie = first < kGoals ? nothing_ : Real(0);
-    if (!(share < most - tie) && !(better && share <= most + tie)) continue;
+    if (i == but || !(share < most - tie || (better && share <= most + tie))) continue;
     most = std::min(most, share);
     steepest = size;
+    tie = nothing_;
     first = i;
   }
-  by = by > 0 ? most : -most;
+  by = most * sign;
   return first;
 }
 
@@ -355,13 +360,12 @@ void WithinLimits::ease() noexcept {
     const Real whole = down / bend;
     Real by = whole;
     std::size_t row = kGoals;
-    for (std::size_t k = 0; k < columns_count_ + rows_count_; ++k) {
-      const bool in_rows = k >= columns_count_;
-      const std::size_t i = in_rows ? k - columns_count_ : k, variable = in_rows ? rows_[i] : columns_[i];
-      const Real change = in_rows ? rows_way[i] : way[i], size = std::fabs(change);
-      if (variable >= kMostRotors || !(by * size > room(variable, change > 0))) continue;
-      by = std::max(room(variable, change > 0), Real(0)) / size;
-      row = in_rows ? i : kGoals;
+    for (std::size_t j = 0; j < columns_count_; ++j) by = std::min(by, distance(columns_[j], way[j]));
+    for (std::size_t i = 0; i < rows_count_; ++i) {
+      const Real most = distance(rows_[i], rows_way[i]);
+      if (!(most < by)) continue;
+      by = most;
+      row = i;
     }
     for (std::size_t j = 0; j < columns_count_; ++j) values_[columns_[j]] += by * way[j];
     for (std::size_t i = 0; i < rows_count_; ++i) values_[rows_[i]] += by * rows_way[i];
@@ -374,10 +378,8 @@ void WithinLimits::ease() noexcept {
   cut_short_ = true;
 }
 
-Row WithinLimits::thrusts() const noexcept {
-  Row result(rotors_);
-  for (std::size_t i = 0; i < rotors_; ++i) result[i] = nearest(values_[i], {lowest_[i], highest_[i]});
-  return result;
+void WithinLimits::thrusts(Row& result) const noexcept {
+  for (std::size_t i = 0; i < rotors_; ++i) result[i] = nearest(values_[i], {limits_.low[i], limits_.high[i]});
 }
 
 }  // namespace kphi::compensation

@@ -15,8 +15,20 @@
 
 namespace kphi::compensation {
 
-/// What one demand weighs the thrusts with, a number for each rotor: the demand is about their sum of products.
-using Row = Rotors<Real>;
+/// A number for each rotor. Unlike Rotors, of no value before it has one: the mixer has many of them.
+struct Row {
+  Row() noexcept = default;
+  explicit Row(std::size_t count) noexcept : count_(static_cast<std::uint32_t>(count)) {}
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  [[nodiscard]] Real& operator[](std::size_t i) noexcept { return values_[i]; }
+  [[nodiscard]] const Real& operator[](std::size_t i) const noexcept { return values_[i]; }
+  [[nodiscard]] const Real* begin() const noexcept { return values_; }
+  [[nodiscard]] const Real* end() const noexcept { return values_ + count_; }
+
+ private:
+  Real values_[kMostRotors];
+  std::uint32_t count_ = 0;
+};
 
 [[nodiscard]] inline Real dot(const Row& a, const Row& b) noexcept {
   Real sum = 0;
@@ -37,9 +49,9 @@ class WithinLimits {
   };
   enum class Goal : std::uint8_t { roll, pitch, thrust, yaw };
 
-  /// Begins at `start`, cut to the limits. `roll` and `pitch` weigh the thrusts [m]; `reach` is the largest of their
-  /// sizes [m]. There is no yaw before set_yaw().
-  WithinLimits(const Limits& limits, const Row& start, const Row& roll, const Row& pitch, Real reach) noexcept;
+  /// Begins at `start`, cut to the limits, which must live as long as this and are narrowed by it. The rotors are at
+  /// (`x`, `y`) [m], roll = y·f, pitch = −x·f; `reach` is the largest of them [m]. There is no yaw before set_yaw().
+  WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Real reach) noexcept;
 
   /// (roll, pitch) come as near to these [N m] as can be, in the sum of squares, and stay there.
   void reach_roll_pitch(Real roll, Real pitch) noexcept;
@@ -53,7 +65,8 @@ class WithinLimits {
   /// Towards the smallest of the thrusts that do the same, in the sum of squares.
   void ease() noexcept;
 
-  [[nodiscard]] Row thrusts() const noexcept;
+  /// Into `result`, which has as many rotors.
+  void thrusts(Row& result) const noexcept;
   /// By the arms of set_yaw() [N m].
   [[nodiscard]] Real yaw() const noexcept { return values_[index(Goal::yaw)] * yaw_scale_; }
   /// Of the search so far; its beginning is one.
@@ -88,6 +101,8 @@ class WithinLimits {
   void approach(std::size_t goal, Range wanted) noexcept;
   /// The column that moves `row` by `need` the fastest; columns_count_ if none can.
   [[nodiscard]] std::size_t entering(std::size_t row, Real need, bool careful) const noexcept;
+  /// How far until the variable, which changes by `change` of it, is at its limit.
+  [[nodiscard]] Real distance(std::size_t variable, Real change) const noexcept;
   /// The first row whose limit a move of this column by `by` meets, which it cuts; kGoals if none.
   [[nodiscard]] std::size_t blocking(std::size_t column, Real& by, std::size_t but, bool careful) const noexcept;
   void move(std::size_t column, Real by) noexcept;
@@ -98,9 +113,9 @@ class WithinLimits {
   /// Makes the variable of this row a column. False if none can take its place.
   bool exchange(std::size_t row) noexcept;
 
+  Limits& limits_;  // as roll and pitch leave them
   std::size_t rotors_, columns_count_, rows_count_ = 3;
   Real values_[kVariables] = {}, low_[kVariables], high_[kVariables];
-  Real lowest_[kMostRotors], highest_[kMostRotors];  // as roll and pitch leave them
   Real entries_[kGoals][kMostRotors];
   std::uint8_t rows_[kGoals], columns_[kMostRotors];
   Real reach_, yaw_scale_ = 0;
