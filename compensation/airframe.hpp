@@ -22,24 +22,30 @@ struct Hinge {
   bool mirrored = false;
 };
 
-/// A body in general: any convex outline, 3 to 8 hinges anywhere, one for each rotor.
+/// A body in general: any convex outline, 3 to 8 hinges anywhere, one for each rotor. Where a body is of several parts,
+/// or not convex, `more` has the others; parts that overlap count twice, so Compensator::build refuses them.
 struct PolygonBody {
+  static constexpr std::size_t kMostMore = 2;
+  explicit PolygonBody(const ConvexPolygon& of, const Rotors<Hinge>& at = {}) noexcept : outline(of), hinges(at) {}
   ConvexPolygon outline;
   Rotors<Hinge> hinges;
+  std::array<std::optional<ConvexPolygon>, kMostMore> more{};
 };
 
 /// What an arm can do, and how well its angle must be known.
 struct ArmLimits {
   Radians from{-100 * kPi / 180};  ///< an angle below this, or above `to`, is not believed: degrees, or a broken sensor
   Radians to{190 * kPi / 180};
-  Radians stale{2 * kPi / 180};  ///< how far an arm may have moved since its angle was measured
+  Radians stale{2 * kPi / 180};   ///< how far an arm may have moved since its angle was measured
+  Seconds oldest{Real(0.5)};      ///< an angle older than this is stale whatever its rate
+  Metres stale_hub{Real(0.004)};  ///< as `stale`, of hubs that are told by themselves (set_hubs)
 };
 
 /// Plain data; Compensator::build says whether it makes sense. The body is the square |x|, |y| <= half_side with an arm
 /// hinged at each corner, a quadrotor, unless `polygon` gives another one.
 struct Airframe {
   Metres half_side;
-  Metres arm_length;  ///< hinge to hub; longer than the propeller radius
+  Metres arm_length;  ///< hinge to hub; on the square longer than the propeller radius
   Metres propeller_radius;
   RadPerSec slowest_speed;  ///< speeds are held between these two
   RadPerSec fastest_speed;

@@ -2,19 +2,25 @@
 
 #include <limits>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 
 RotorLayout layout_of(const Airframe& airframe, const Masses& masses, const Rotors<Radians>& arm_angles,
                       const Rotors<int>& spins) noexcept {
-  const std::size_t count = arm_angles.size();
-  RotorLayout layout{Rotors<HubPosition>(count), spins};
+  Rotors<HubPosition> hubs(arm_angles.size());
+  for (std::size_t i = 0; i < hubs.size(); ++i) hubs[i] = hub_in_body(airframe, i, arm_angles[i]);
+  return layout_of(hubs, masses, spins);
+}
+
+RotorLayout layout_of(const Rotors<HubPosition>& hubs, const Masses& masses, const Rotors<int>& spins) noexcept {
+  RotorLayout layout{hubs, spins};
   Real mass = masses.body, x = mass * masses.body_at.x.value(), y = mass * masses.body_at.y.value();
-  for (std::size_t i = 0; i < count; ++i) {
-    const HubPosition hub = layout.hubs[i] = hub_in_body(airframe, i, arm_angles[i]);
+  for (std::size_t i = 0; i < hubs.size(); ++i) {
     const Real here = i < masses.at_hubs.size() ? masses.at_hubs[i] : Real(0);
     mass += here;
-    x += here * hub.x.value();
-    y += here * hub.y.value();
+    x += here * hubs[i].x.value();
+    y += here * hubs[i].y.value();
   }
   const Real per_mass = mass > 0 ? 1 / mass : std::numeric_limits<Real>::quiet_NaN();
   for (HubPosition& hub : layout.hubs) hub = {hub.x - Metres(x * per_mass), hub.y - Metres(y * per_mass)};

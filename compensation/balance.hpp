@@ -25,4 +25,8 @@ struct Masses {
 [[nodiscard]] RotorLayout layout_of(const Airframe& airframe, const Masses& masses, const Rotors<Radians>& arm_angles,
                                     const Rotors<int>& spins) noexcept;
 
+/// The same of hubs that are told by themselves, in the body frame.
+[[nodiscard]] RotorLayout layout_of(const Rotors<HubPosition>& hubs, const Masses& masses,
+                                    const Rotors<int>& spins) noexcept;
+
 }  // namespace kphi::compensation

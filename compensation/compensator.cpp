@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <new>
+
+#include "compensation/strict_math.hpp"
 
 namespace kphi::compensation {
 namespace {
 
 /// Shares that are only rounding: of a curve in its file, of a thrust that is just what a rotor can give.
 constexpr Real kRounding = sizeof(Real) == sizeof(double) ? Real(1e-9) : Real(1e-6);
+constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
 constexpr Real kUnknownAngle = std::numeric_limits<Real>::quiet_NaN();
 
-bool positive(Real value) noexcept { return std::isfinite(value) && value > 0; }
+bool positive(Real value) noexcept { return is_finite(value) && value > 0; }
 
 bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   unsigned seen = 0;
@@ -22,14 +26,22 @@ bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   return seen == 0b1111u;
 }
 
-bool finite(const Hinge& hinge) noexcept {
-  return std::isfinite(hinge.at.x.value()) && std::isfinite(hinge.at.y.value()) && std::isfinite(hinge.turn.value());
+bool known(const Hinge& hinge) noexcept {
+  return is_finite(hinge.at.x.value()) && is_finite(hinge.at.y.value()) && is_finite(hinge.turn.value());
 }
 
 Refusal refusal_of_body(const Airframe& airframe) noexcept {
   if (!airframe.polygon) return one_corner_each(airframe.hinge_turns) ? Refusal::none : Refusal::hinge_turns;
-  const auto& hinges = airframe.polygon->hinges;
-  return std::all_of(hinges.begin(), hinges.end(), finite) ? Refusal::none : Refusal::hinges;
+  const PolygonBody& body = *airframe.polygon;
+  if (!std::all_of(body.hinges.begin(), body.hinges.end(), known)) return Refusal::hinges;
+  for (std::size_t i = 0; i < body.more.size(); ++i) {
+    if (!body.more[i]) continue;
+    if (overlap(body.outline, *body.more[i])) return Refusal::body;
+    for (std::size_t j = 0; j < i; ++j) {
+      if (body.more[j] && overlap(*body.more[i], *body.more[j])) return Refusal::body;
+    }
+  }
+  return Refusal::none;
 }
 
 Refusal refusal_of(const Airframe& airframe, std::size_t curves) noexcept {
@@ -40,11 +52,15 @@ Refusal refusal_of(const Airframe& airframe, std::size_t curves) noexcept {
   }
   for (std::size_t i = 0; i < rotors; ++i) {
     if (!positive(radius_of(airframe, i).value())) return Refusal::sizes;
-    if (airframe.arm_length <= radius_of(airframe, i)) return Refusal::arm_length;
+    if (!airframe.polygon && airframe.arm_length <= radius_of(airframe, i)) return Refusal::arm_length;
   }
   const Real slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
-  if (!(slowest >= 0) || !(fastest > slowest) || !std::isfinite(fastest)) return Refusal::speeds;
-  if (!(airframe.arms.from < airframe.arms.to) || !(airframe.arms.stale.value() > 0)) return Refusal::arm_limits;
+  if (!(slowest >= 0) || !(fastest > slowest) || !is_finite(fastest)) return Refusal::speeds;
+  const ArmLimits& arms = airframe.arms;
+  if (!(arms.from < arms.to) || !(arms.stale.value() > 0) || !(arms.stale_hub.value() > 0) ||
+      !(arms.oldest.value() > 0)) {
+    return Refusal::arm_limits;
+  }
   return refusal_of_body(airframe);
 }
 
@@ -80,46 +96,73 @@ const char* describe(Refusal refusal) noexcept {
       "a curve was fitted with another overlap measure than the airframe flies with; fly the measure of the fit, "
       "or fit again",
       "a vehicle has 3 to 8 rotors, with a curve and a hinge for each; count them",
-      "arm limits must satisfy from < to, and stale > 0; check them [rad]"};
-  return refusal <= Refusal::arm_limits ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
+      "arm limits must satisfy from < to, and stale, stale_hub and oldest > 0; check them [rad, m, s]",
+      "a curve needs K_T > 0, intercept > 0, a finite slope, a largest angle in (0, 2 pi]; check it",
+      "parts of the body overlap; give convex parts that meet at an edge at most",
+      "the tables of k and torque of all rotors have more than 96 knots together; give rotors with like propellers the "
+      "same table, or fit fewer knots"};
+  return refusal <= Refusal::knots ? kSentences[static_cast<std::size_t>(refusal)] : "unknown refusal";
 }
 
 BuildOutcome Compensator::build(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept {
   BuildOutcome outcome;
-  outcome.refusal = refusal_of(airframe, curves.size());
-  for (const ThrustCurve& curve : curves) {
-    if (outcome.refusal == Refusal::none && curve.overlap() != airframe.overlap) outcome.refusal = Refusal::overlap;
+  Parts parts{curves.size(),
+              &curves,
+              [](const void* all, std::size_t rotor) noexcept {
+                return (*static_cast<const Rotors<ThrustCurve>*>(all))[rotor].parts();
+              },
+              &airframe,
+              [](const void* from, Airframe& to) noexcept { to = *static_cast<const Airframe*>(from); },
+              law};
+  outcome.refusal = build_at(&outcome.compensator.emplace(), parts);
+  if (outcome.refusal != Refusal::none) {
+    outcome.compensator.reset();
+    return outcome;
   }
-  if (outcome.refusal != Refusal::none) return outcome;
   outcome.doubts = Rotors<CurveDoubts>(curves.size());
   for (std::size_t i = 0; i < curves.size(); ++i) outcome.doubts[i] = doubts_about(curves[i], law);
-  outcome.compensator = Compensator(curves, airframe, law);
   return outcome;
 }
 
-Compensator::Compensator(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept
-    : effective_coefficients_(curves.size()),
-      slowest_(airframe.slowest_speed.value()),
-      fastest_(airframe.fastest_speed.value()),
-      arm_flags_(curves.size()),
-      law_(law),
-      arm_angles_(curves.size(), Radians(kUnknownAngle)),  // differs from every first angle
-      occlusion_angles_(curves.size()),
-      scaling_factors_(curves.size()),
-      thrust_max_(curves.size()),
-      drag_scale_(curves.size()),
-      curves_(curves),
-      airframe_(airframe),
-      contact_free_(curves.size()) {
-  for (const ThrustCurve& curve : curves) speed_trends_ = speed_trends_ || std::fabs(curve.speed_trend().per_rad_s) > 0;
-  for (std::size_t i = 0; i < rotors(); ++i) {
-    contact_free_[i] = window_of(airframe, i);
+Refusal Compensator::build_at(void* place, const Parts& parts) noexcept {
+  Compensator& built = *::new (place) Compensator();
+  parts.put_airframe(parts.airframe, built.airframe_);
+  built.law_ = parts.law;
+  Refusal refusal = refusal_of(built.airframe_, parts.rotors);
+  for (std::size_t i = 0; refusal == Refusal::none && i < parts.rotors; ++i) {
+    const CurveParts curve = parts.curve_of(parts.curves, i);
+    built.speed_trends_ = built.speed_trends_ || std::fabs(curve.speed_trend.per_rad_s) > 0;
+    if (!sound(curve)) {
+      refusal = Refusal::curve;
+    } else if (curve.overlap != built.airframe_.overlap) {
+      refusal = Refusal::overlap;
+    } else if (!built.curves_.add(curve)) {
+      refusal = Refusal::knots;
+    }
+  }
+  if (refusal != Refusal::none) built.curves_.clear();
+  built.begin();
+  return refusal;
+}
+
+void Compensator::begin() noexcept {
+  const std::size_t count = curves_.size();
+  slowest_ = airframe_.slowest_speed.value();
+  fastest_ = airframe_.fastest_speed.value();
+  for (Rotors<Real>* each : {&effective_coefficients_, &scaling_factors_, &drag_scale_}) each->resize(count);
+  for (Rotors<Radians>* each : {&arm_angles_, &occlusion_angles_}) each->resize(count);
+  arm_flags_.resize(count);
+  thrust_max_.resize(count);
+  contact_free_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    arm_angles_[i] = Radians(kUnknownAngle);  // differs from every first angle
+    contact_free_[i] = window_of(airframe_, i);
     apply_occlusion(i);
   }
 }
 
 Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
-  const bool unknown = !std::isfinite(angle.value());
+  const bool unknown = !is_finite(angle.value());
   const bool beyond = !unknown && (angle < airframe_.arms.from || angle > airframe_.arms.to);
   arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, unknown).with(Flag::arm_angle_beyond, beyond);
   if (unknown || beyond || angle == arm_angles_[i]) return Arm::at_rest;
@@ -129,15 +172,17 @@ Compensator::Arm Compensator::take(std::size_t i, Radians angle) noexcept {
 }
 
 void Compensator::set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback& feedback) noexcept {
+  hubs_.resize(0);
   // In passes over all arms: the long calls of one pass do not wait for each other.
   Arm arms[kMostRotors];
   bool all_at_rest = true;
   const Real age = feedback.age.value();
+  const bool young = age <= airframe_.arms.oldest.value();
   for (std::size_t i = 0; i < rotors(); ++i) {
     arms[i] = take(i, i < arm_angles.size() ? arm_angles[i] : Radians(kUnknownAngle));
     all_at_rest = all_at_rest && arms[i] == Arm::at_rest;
     const Real rate = i < feedback.rates.size() ? feedback.rates[i].value() : Real(0);
-    const bool fresh = std::fabs(rate) * age <= airframe_.arms.stale.value();
+    const bool fresh = young && std::fabs(rate) * age <= airframe_.arms.stale.value();
     arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_stale, !fresh);
   }
   if (all_at_rest) return;
@@ -152,6 +197,36 @@ void Compensator::set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback&
   for (std::size_t i = 0; i < rotors(); ++i) {
     if (arms[i] != Arm::at_rest) apply_occlusion(i);
   }
+}
+
+void Compensator::set_hubs(const Rotors<HubPosition>& hubs, const HubFeedback& feedback) noexcept {
+  constexpr Real kFarthest = 100;
+  if (hubs_.size() == 0) {
+    for (std::size_t i = 0; i < rotors(); ++i) {
+      arm_angles_[i] = Radians(kUnknownAngle);
+      hubs_.add({Metres(kUnknownAngle), Metres(kUnknownAngle)});
+    }
+  }
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    const HubPosition hub = i < hubs.size() ? hubs[i] : HubPosition{Metres(kUnknownAngle), Metres(kUnknownAngle)};
+    const Real x = hub.x.value(), y = hub.y.value();
+    const bool unknown = !is_finite(x) || !is_finite(y);
+    const bool beyond = !unknown && (std::fabs(x) > kFarthest || std::fabs(y) > kFarthest);
+    arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_unknown, unknown).with(Flag::arm_angle_beyond, beyond);
+    const Real speed = i < feedback.speeds.size() ? feedback.speeds[i] : Real(0), age = feedback.age.value();
+    const bool fresh =
+        age <= airframe_.arms.oldest.value() && std::fabs(speed) * age <= airframe_.arms.stale_hub.value();
+    arm_flags_[i] = arm_flags_[i].with(Flag::arm_angle_stale, !fresh);
+    if (unknown || beyond) continue;
+    hubs_[i] = hub;
+    occlusion_angles_[i] = occlusion_beside_body(airframe_, i, hub);
+    apply_occlusion(i);
+  }
+}
+
+RotorLayout Compensator::layout(const Masses& masses, const Rotors<int>& spins) const noexcept {
+  if (hubs_.size() == 0) return layout_of(airframe_, masses, arm_angles_, spins);
+  return layout_of(hubs_, masses, spins);
 }
 
 void Compensator::enable(bool on) noexcept {
@@ -169,28 +244,30 @@ bool Compensator::set_air_density_ratio(Real ratio) noexcept {
 void Compensator::resume_from(const Compensator& before) noexcept {
   enabled_ = before.enabled_;
   density_ratio_ = before.density_ratio_;
-  set_arms(before.arm_angles_);
+  if (before.hubs_.size() != 0) {
+    set_hubs(before.hubs_);
+  } else {
+    set_arms(before.arm_angles_);
+  }
   for (std::size_t i = 0; i < rotors(); ++i) apply_occlusion(i);
 }
 
 void Compensator::apply_occlusion(std::size_t rotor) noexcept {
-  const ThrustCurve& curve = curves_[rotor];
   const Radians phi = occlusion_angles_[rotor];
   const bool covered = enabled_ && phi.value() > 0;
-  const Real scaling = covered ? curve.scaling_factor(phi, law_) : Real(1);
+  const Real thrust_coefficient = curves_.thrust_coefficient(rotor), k = curves_.k_at(rotor, phi);
+  const Real scaling = covered ? scaling_factor_of(k, thrust_coefficient, phi, law_) : Real(1);
   // The published law reaches 0 and below: divide by next to nothing then, and the fastest speed holds.
-  const Real effective =
-      std::max(curve.thrust_coefficient().value() * scaling * density_ratio_, std::numeric_limits<Real>::min());
+  const Real effective = std::max(thrust_coefficient * scaling * density_ratio_, std::numeric_limits<Real>::min());
   scaling_factors_[rotor] = scaling;
   effective_coefficients_[rotor] = effective;
-  const Real at_fastest = follows_trends() ? curve.speed_trend().factor_at(fastest_) : Real(1);
+  const Real at_fastest = follows_trends() ? curves_.speed_trend(rotor).factor_at(fastest_) : Real(1);
   thrust_max_[rotor] = Newtons(effective * (fastest_ * fastest_) * at_fastest);
-  drag_scale_[rotor] = (covered ? curve.torque_share_at(phi) : Real(1)) / std::max(scaling, kScalingFloor);
-  arm_flags_[rotor] =
-      arm_flags_[rotor]
-          .with(Flag::beyond_fit, phi > curve.largest_fitted())
-          .with(Flag::at_floor, scaling <= kScalingFloor)
-          .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && curve.at(phi) > curve.thrust_coefficient());
+  drag_scale_[rotor] = (covered ? curves_.torque_share_at(rotor, phi) : Real(1)) / std::max(scaling, kScalingFloor);
+  arm_flags_[rotor] = arm_flags_[rotor]
+                          .with(Flag::beyond_fit, phi > curves_.largest_fitted(rotor))
+                          .with(Flag::at_floor, scaling <= kScalingFloor)
+                          .with(Flag::at_ceiling, covered && law_ == ScalingLaw::clamped && k > thrust_coefficient);
 }
 
 SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexcept {
@@ -221,14 +298,14 @@ SpeedCommand Compensator::speeds_for(const Rotors<Newtons>& thrusts) const noexc
 }
 
 void Compensator::follow_trends(Real (&speeds)[kMostRotors]) const noexcept {
-  for (std::size_t i = 0; i < rotors(); ++i) speeds[i] = curves_[i].speed_trend().speed_for(speeds[i]);
+  for (std::size_t i = 0; i < rotors(); ++i) speeds[i] = curves_.speed_trend(i).speed_for(speeds[i]);
 }
 
 void Compensator::flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors],
                        Rotors<Flags>& flags) const noexcept {
   for (std::size_t i = 0; i < rotors(); ++i) {
     flags[i] = flags[i]
-                   .with(Flag::thrust_nan, std::isnan(asked[i]))
+                   .with(Flag::thrust_nan, is_nan(asked[i]))
                    .with(Flag::thrust_negative, asked[i] < 0)
                    .with(Flag::speed_at_slowest, wanted[i] < slowest_ * (1 - kRounding))
                    .with(Flag::speed_at_fastest, wanted[i] > fastest_ * (1 + kRounding));
@@ -239,32 +316,38 @@ Rotors<Newtons> Compensator::uncovered_thrusts(const Rotors<Newtons>& thrusts) c
   Rotors<Newtons> uncovered(rotors());
   for (std::size_t i = 0; i < rotors(); ++i) {
     const Real asked = thrust_of(thrusts, i), possible = asked > 0 ? asked : Real(0);
-    const Real coefficient = curves_[i].thrust_coefficient().value() * density_ratio_;
+    const Real coefficient = curves_.thrust_coefficient(i) * density_ratio_;
     uncovered[i] = std::min(Newtons(possible), thrust_max_[i]) * (coefficient / effective_coefficients_[i]);
   }
   return uncovered;
 }
 
-Rotors<RadPerSec> Compensator::speed_uncertainties(const Rotors<Newtons>& thrusts,
+Rotors<RadPerSec> Compensator::speed_uncertainties(const Rotors<ThrustCurve>& curves, const Rotors<Newtons>& thrusts,
                                                    Radians arm_angle_uncertainty) const noexcept {
-  constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
   const SpeedCommand command = speeds_for(thrusts);
   Rotors<RadPerSec> uncertainties(rotors(), RadPerSec(kUnknown));
-  if (!std::isfinite(arm_angle_uncertainty.value())) return uncertainties;
-  for (std::size_t i = 0; i < rotors(); ++i) {
-    const Radians angle = arm_angles_[i], phi = enabled_ ? occlusion_angles_[i] : Radians(0);
-    if (arm_flags_[i].has(Flag::arm_angle_unknown) || arm_flags_[i].has(Flag::arm_angle_beyond)) continue;
-    Radians spread(0);
-    if (enabled_ && std::isfinite(angle.value())) {
-      const Radians above = occlusion_of_arm(airframe_, i, angle + arm_angle_uncertainty);
-      const Radians below = occlusion_of_arm(airframe_, i, angle - arm_angle_uncertainty);
-      spread = Radians(std::fabs((above - below).value()) / 2);
-    }
-    const Real relative = curves_[i].relative_uncertainty(phi, spread, phi.value() > 0 ? law_ : ScalingLaw::clamped);
-    // Zero times infinity would be NaN.
-    if (relative < kUnknown) uncertainties[i] = RadPerSec(relative / 2 * command.speeds[i].value());
-  }
+  for (std::size_t i = 0; i < rotors() && i < curves.size(); ++i)
+    uncertainties[i] = speed_uncertainty(i, curves[i], command.speeds[i], arm_angle_uncertainty);
   return uncertainties;
+}
+
+RadPerSec Compensator::speed_uncertainty(std::size_t rotor, const ThrustCurve& curve, RadPerSec speed,
+                                         Radians arm_angle_uncertainty) const noexcept {
+  const Flags flags = arm_flags_[rotor];
+  const bool by_hub = hubs_.size() != 0 && arm_angle_uncertainty.value() > 0;  // of what angle?
+  const bool known = is_finite(arm_angle_uncertainty.value()) && !by_hub && !flags.has(Flag::arm_angle_unknown) &&
+                     !flags.has(Flag::arm_angle_beyond);
+  if (!known) return RadPerSec(kUnknown);
+  const Radians angle = arm_angles_[rotor], phi = enabled_ ? occlusion_angles_[rotor] : Radians(0);
+  Radians spread(0);
+  if (enabled_ && is_finite(angle.value())) {
+    const Radians above = occlusion_of_arm(airframe_, rotor, angle + arm_angle_uncertainty);
+    const Radians below = occlusion_of_arm(airframe_, rotor, angle - arm_angle_uncertainty);
+    spread = Radians(std::fabs((above - below).value()) / 2);
+  }
+  const Real relative = curve.relative_uncertainty(phi, spread, phi.value() > 0 ? law_ : ScalingLaw::clamped);
+  // Zero times infinity would be NaN.
+  return RadPerSec(relative < kUnknown ? relative / 2 * speed.value() : kUnknown);
 }
 
 }  // namespace kphi::compensation

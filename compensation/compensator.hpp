@@ -14,6 +14,7 @@
 #include "compensation/airframe.hpp"
 #include "compensation/balance.hpp"
 #include "compensation/flag_set.hpp"
+#include "compensation/flown_curves.hpp"
 #include "compensation/occlusion.hpp"
 #include "compensation/rotors.hpp"
 #include "compensation/thrust_curve.hpp"
@@ -60,24 +61,53 @@ enum class Refusal : std::uint8_t {
   hinges,       ///< hinges of a polygon body must be finite
   overlap,      ///< every curve must be fitted with the overlap measure that the airframe flies with
   rotors,       ///< as many curves as arms, 3 to 8; propeller radii for all of them or none
-  arm_limits,   ///< from < to, stale above 0
+  arm_limits,   ///< from < to; stale, stale_hub and oldest above 0
+  curve,        ///< a curve must be sound(): of build_at() alone
+  body,         ///< parts of a body must not overlap
+  knots,        ///< the tables of all rotors that differ have more than FlownCurves::kMostKnots knots together
 };
 
 /// One sentence, with the next move.
 [[nodiscard]] const char* describe(Refusal refusal) noexcept;
 
+/// How fast hubs moved when their places were measured, and how long ago that was.
+struct HubFeedback {
+  Seconds age{0};         ///< as in ArmFeedback
+  Rotors<Real> speeds{};  ///< [m/s] of each hub; missing ones count as 0
+};
+
 struct BuildOutcome;
 
 class Compensator {
  public:
-  /// The only place that refuses. `curves` and `airframe` in the order of the rotors.
+  /// Of no rotors.
+  Compensator() noexcept = default;
+  /// The only place that refuses, with build_at(). `curves` and `airframe` in the order of the rotors.
   [[nodiscard]] static BuildOutcome build(const Rotors<ThrustCurve>& curves, const Airframe& airframe,
                                           ScalingLaw law = ScalingLaw::clamped) noexcept;
+
+  /// What build_at() builds of, wherever it is.
+  struct Parts {
+    std::size_t rotors;
+    const void* curves;
+    CurveParts (*curve_of)(const void* curves, std::size_t rotor);
+    const void* airframe;
+    void (*put_airframe)(const void* airframe, Airframe& to);  ///< into one that has its defaults
+    ScalingLaw law = ScalingLaw::clamped;
+  };
+  /// The same in place, for stacks too small for a BuildOutcome: into `place`, which has room for a Compensator. Where
+  /// it is refused, there is one of no rotors, whose calls do nothing.
+  [[nodiscard]] static Refusal build_at(void* place, const Parts& parts) noexcept;
 
   /// At servo rate. Recomputes φ and k_i of the arms that moved; an angle that is not finite, or outside the arm's
   /// limits, keeps the last φ. With `feedback` an arm that may have gone on moving by more than ArmLimits::stale is
   /// flagged. Before the first call no propeller is taken to be covered.
   void set_arms(const Rotors<Radians>& arm_angles, const ArmFeedback& feedback = {}) noexcept;
+
+  /// At servo rate, instead of set_arms: for arms that get longer, of several joints, or measured by where their hubs
+  /// are [m, body frame]. The same φ and k_i as of arms whose hubs are there, to rounding; the same flags: one that is
+  /// not finite, or is further from the origin than 100 m, keeps the last φ.
+  void set_hubs(const Rotors<HubPosition>& hubs, const HubFeedback& feedback = {}) noexcept;
 
   /// At control rate. ω = sqrt(max(T, 0) / (K_T k_i)) (equation 4), held between slowest and fastest; never NaN.
   /// Where nothing is covered this is sqrt(T / K_T) bit for bit, unless the curve changes with the speed (SpeedTrend).
@@ -88,11 +118,16 @@ class Compensator {
   /// stack's own thrust curve or ThrottleCurve, must be asked for, held within [0, K_T ω_fastest²]. NaN counts as 0.
   [[nodiscard]] Rotors<Newtons> uncovered_thrusts(const Rotors<Newtons>& thrusts) const noexcept;
 
-  /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from the curves' own and
-  /// that of the arm angles [rad], which moves φ. +∞ where none can be given: the curve carries
-  /// none, k_i is at its floor, the arm angle is not known. Costs up to eight times a set_arms: for logs and planning.
-  [[nodiscard]] Rotors<RadPerSec> speed_uncertainties(const Rotors<Newtons>& thrusts,
+  /// Standard uncertainty [rad/s] of the speeds that speeds_for gives for these thrusts, from that of `curves`, the
+  /// ones it was built of, which it does not keep, and of the arm angles [rad], which moves φ. +∞ where none can be
+  /// given: a curve carries none or is missing, k_i is at its floor, the arm angle is not known. Costs up to eight
+  /// times a set_arms: for logs and planning.
+  [[nodiscard]] Rotors<RadPerSec> speed_uncertainties(const Rotors<ThrustCurve>& curves, const Rotors<Newtons>& thrusts,
                                                       Radians arm_angle_uncertainty = Radians(0)) const noexcept;
+
+  /// The same of one rotor at this speed.
+  [[nodiscard]] RadPerSec speed_uncertainty(std::size_t rotor, const ThrustCurve& curve, RadPerSec speed,
+                                            Radians arm_angle_uncertainty = Radians(0)) const noexcept;
 
   /// Compensated or not. When off every k_i is 1, no curve changes with the speed, and speeds_for is the plain map bit
   /// for bit; φ is followed all the same.
@@ -122,15 +157,14 @@ class Compensator {
   /// 1/k_i times the curve's torque share at φ: by this the torque per thrust grows; for the allocation. In
   /// [1/kMostTorque, kMostTorque/kScalingFloor].
   [[nodiscard]] const Rotors<Real>& drag_scale() const noexcept { return drag_scale_; }
-  /// Of the shape that the last set_arms told, for Mixer::set_layout, which refuses it where no angle is known yet.
-  [[nodiscard]] RotorLayout layout(const Masses& masses, const Rotors<int>& spins) const noexcept {
-    return layout_of(airframe_, masses, arm_angles_, spins);
-  }
+  /// Of the shape that the last set_arms or set_hubs told, for Mixer::set_layout, which refuses it where no angle is
+  /// known yet.
+  [[nodiscard]] RotorLayout layout(const Masses& masses, const Rotors<int>& spins) const noexcept;
   /// What the last set_arms found; speeds_for repeats it in its flags.
   [[nodiscard]] const Rotors<Flags>& arm_flags() const noexcept { return arm_flags_; }
 
  private:
-  Compensator(const Rotors<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) noexcept;
+  void begin() noexcept;
   /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
   [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
@@ -142,19 +176,20 @@ class Compensator {
 
   Rotors<Real> effective_coefficients_;  // K_T k_i with the air's density, positive: what speeds_for divides by
   Real density_ratio_ = 1;
-  Real slowest_;
-  Real fastest_;
+  Real slowest_ = 0;
+  Real fastest_ = 0;
   Rotors<Flags> arm_flags_;
   bool enabled_ = true;
   bool speed_trends_ = false;  // of any curve
-  ScalingLaw law_;
+  ScalingLaw law_ = ScalingLaw::clamped;
   Rotors<Radians> arm_angles_;
+  Rotors<HubPosition> hubs_;  // those of set_hubs(), where it was the last; else none
   Rotors<Radians> occlusion_angles_;
   Rotors<Real> scaling_factors_;
   Rotors<Newtons> thrust_max_;
   Rotors<Real> drag_scale_;
-  Rotors<ThrustCurve> curves_;
-  Airframe airframe_;
+  FlownCurves curves_;
+  Airframe airframe_{};
   Rotors<ContactFreeWindow> contact_free_;
 };
 

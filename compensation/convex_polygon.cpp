@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -52,11 +54,11 @@ Real inside_the_disk(Real offset, Real from, Real to, OverlapMeasure measure) no
 std::optional<ConvexPolygon> ConvexPolygon::from(const Position* corners, std::size_t count) noexcept {
   if (corners == nullptr || count < 3 || count > kMaxCorners) return std::nullopt;
   ConvexPolygon polygon;
-  polygon.size_ = count;
+  polygon.size_ = static_cast<std::uint32_t>(count);
   Real turned = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Position &here = corners[i], &next = corners[(i + 1) % count], &after = corners[(i + 2) % count];
-    if (!std::isfinite(here.x.value()) || !std::isfinite(here.y.value())) return std::nullopt;
+    if (!is_finite(here.x.value()) || !is_finite(here.y.value())) return std::nullopt;
     const Real cross = turn(here, next, after);
     const Real along =
         (next.x - here.x).value() * (after.x - next.x).value() + (next.y - here.y).value() * (after.y - next.y).value();
@@ -78,6 +80,21 @@ ConvexPolygon ConvexPolygon::square(Metres half_side) noexcept {
   polygon.corners_[2] = {-half_side, -half_side};
   polygon.corners_[3] = {half_side, -half_side};
   return polygon;
+}
+
+/// Whether all of `b` is on the outer side of an edge of `a`.
+static bool beside_an_edge(const ConvexPolygon& a, const ConvexPolygon& b) noexcept {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    bool outside = true;
+    for (std::size_t j = 0; outside && j < b.size(); ++j)
+      outside = !(turn(a.corner(i), a.corner((i + 1) % a.size()), b.corner(j)) > 0);
+    if (outside) return true;
+  }
+  return false;
+}
+
+bool overlap(const ConvexPolygon& a, const ConvexPolygon& b) noexcept {
+  return !beside_an_edge(a, b) && !beside_an_edge(b, a);
 }
 
 Radians occlusion_angle(const ConvexPolygon& body, Metres radius, Position hub, OverlapMeasure measure) noexcept {

@@ -67,8 +67,11 @@ class ConvexPolygon {
  private:
   ConvexPolygon() noexcept = default;
   std::array<Position, kMaxCorners> corners_{};
-  std::size_t size_ = 0;
+  std::uint32_t size_ = 0;
 };
+
+/// Whether they have an area in common: more than an edge.
+[[nodiscard]] bool overlap(const ConvexPolygon& a, const ConvexPolygon& b) noexcept;
 
 /// The occlusion angle φ, in [0, 2π] rad, of the disk (hub [m], radius [m]) over the body, in any measure:
 ///   rim_arc     length of the rim inside the body, in radians of the rim,

@@ -2,11 +2,19 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <new>
 
 #include "compensation/compensator.hpp"
 #include "compensation/mixing.hpp"
+#include "compensation/strict_math.hpp"
 #include "compensation/throttle.hpp"
+
+#ifdef __GNUC__
+#define KPHI_BY_ITSELF [[gnu::noinline]]
+#else
+#define KPHI_BY_ITSELF
+#endif
 
 namespace {
 
@@ -20,7 +28,8 @@ static_assert(KPHI_MAX_CORNERS == ConvexPolygon::kMaxCorners && KPHI_MAX_ROTORS 
 static_assert(KPHI_ARM_ANGLE_STALE == static_cast<int>(Flag::arm_angle_stale) &&
               KPHI_THRUST_NAN == static_cast<int>(Flag::thrust_nan));
 static_assert(KPHI_LOAD_SHARE == static_cast<int>(OverlapMeasure::load_share));
-static_assert(KPHI_DEMAND_NAN == static_cast<int>(Concession::demand_nan));
+static_assert(KPHI_DEMAND_NAN == static_cast<int>(Concession::demand_nan) &&
+              KPHI_MIX_UNFINISHED == static_cast<int>(Concession::unfinished));
 static_assert(KPHI_LAW_PUBLISHED == static_cast<int>(ScalingLaw::published));
 static_assert(sizeof(unsigned short) == sizeof(Flags));
 
@@ -59,40 +68,55 @@ std::optional<OverlapMeasure> measure_of(int code) noexcept {
   return static_cast<OverlapMeasure>(code);
 }
 
-std::optional<OcclusionTable> table_of(const kphi_knot* knots, int count) noexcept {
-  if (count < 0 || count > KPHI_MAX_KNOTS) return std::nullopt;
-  Knot taken[KPHI_MAX_KNOTS];
-  for (int i = 0; i < count; ++i) taken[i] = {Radians(knots[i].phi_rad), knots[i].value, knots[i].error};
-  return OcclusionTable::from(taken, static_cast<std::size_t>(count));
+KnotList knots_of(const kphi_knot (&knots)[KPHI_MAX_KNOTS], int count) noexcept {
+  // As many as are too many stand for a count that is none.
+  const std::size_t many = count < 0 || count > KPHI_MAX_KNOTS ? kMostKnots + 1 : static_cast<std::size_t>(count);
+  return {knots, many, [](const void* from, std::size_t i) noexcept {
+            const kphi_knot& knot = static_cast<const kphi_knot*>(from)[i];
+            return Knot{Radians(knot.phi_rad), knot.value, knot.error};
+          }};
 }
 
-/// k(φ) alone.
-std::optional<ThrustCurve> form_of(const kphi_curve& curve, OverlapMeasure overlap) noexcept {
-  const Radians largest(curve.largest_fitted_rad);
-  if (curve.knot_count != 0) {
-    const auto k = table_of(curve.knots, curve.knot_count);
-    return k ? ThrustCurve::from_table(*k, largest, overlap) : std::nullopt;
-  }
-  std::optional<LineUncertainty> uncertainty;
-  if (curve.has_uncertainty != 0) {
-    uncertainty = LineUncertainty{curve.thrust_coefficient_error, curve.intercept_variance, curve.covariance,
-                                  curve.slope_variance};
-  }
-  return ThrustCurve::from_line(ThrustCoefficient(curve.thrust_coefficient), ThrustCoefficient(curve.intercept),
-                                curve.slope_per_rad, largest, overlap, uncertainty);
+LineUncertainty uncertainty_of(const kphi_curve& from) noexcept {
+  return {from.thrust_coefficient_error, from.intercept_variance, from.covariance, from.slope_variance};
 }
 
-std::optional<ThrustCurve> curve_of(const kphi_curve& from) noexcept {
+CurveParts parts_of(const kphi_curve& from) noexcept {
+  CurveParts parts{ThrustCoefficient(from.thrust_coefficient),
+                   ThrustCoefficient(from.intercept),
+                   from.slope_per_rad,
+                   Radians(from.largest_fitted_rad),
+                   OverlapMeasure::rim_arc,
+                   knots_of(from.knots, from.knot_count),
+                   knots_of(from.torque, from.torque_count),
+                   {from.trend_per_rad_s, RadPerSec(from.trend_reference)}};
   const auto overlap = measure_of(from.overlap);
-  auto curve = overlap ? form_of(from, *overlap) : std::nullopt;
-  if (curve && from.torque_count != 0) {
-    const auto share = table_of(from.torque, from.torque_count);
-    if (!share || !curve->set_torque_share(*share)) return std::nullopt;
-  }
-  const bool trend = !(std::fabs(from.trend_per_rad_s) <= 0);
-  if (curve && trend && !curve->set_speed_trend({from.trend_per_rad_s, RadPerSec(from.trend_reference)})) {
-    return std::nullopt;
-  }
+  const bool errors = from.has_uncertainty == 0 || from.knot_count != 0 || sound(uncertainty_of(from));
+  if (!overlap || !errors) return {};  // of which no curve can be made
+  parts.overlap = *overlap;
+  if (from.knot_count > 0) parts.thrust_coefficient = ThrustCoefficient(from.knots[0].value);
+  return parts;
+}
+
+std::optional<OcclusionTable> table_of(const KnotList& knots) noexcept {
+  Knot taken[KPHI_MAX_KNOTS];
+  if (knots.count > kMostKnots) return std::nullopt;
+  for (std::size_t i = 0; i < knots.count; ++i) taken[i] = knots[i];
+  return OcclusionTable::from(taken, knots.count);
+}
+
+/// With its uncertainties: for the ground.
+std::optional<ThrustCurve> curve_of(const kphi_curve& from) noexcept {
+  const CurveParts parts = parts_of(from);
+  if (!sound(parts)) return std::nullopt;
+  std::optional<LineUncertainty> errors;
+  if (from.has_uncertainty != 0) errors = uncertainty_of(from);
+  auto curve = parts.k.count > 0
+                   ? ThrustCurve::from_table(*table_of(parts.k), parts.largest_fitted, parts.overlap)
+                   : ThrustCurve::from_line(parts.thrust_coefficient, parts.intercept, parts.slope_per_rad,
+                                            parts.largest_fitted, parts.overlap, errors);
+  if (curve && parts.torque.count > 0) (void)curve->set_torque_share(*table_of(parts.torque));
+  if (curve) (void)curve->set_speed_trend(parts.speed_trend);
   return curve;
 }
 
@@ -102,33 +126,59 @@ std::size_t rotors_of(const kphi_airframe& airframe) noexcept {
   return possible ? static_cast<std::size_t>(airframe.rotors) : 0;
 }
 
-std::optional<PolygonBody> body_of(const kphi_airframe& airframe) noexcept {
-  if (airframe.corner_count < 0 || airframe.corner_count > KPHI_MAX_CORNERS) return std::nullopt;
+/// By itself: the corners are off the stack when the curves are taken.
+KPHI_BY_ITSELF std::optional<ConvexPolygon> outline_of(const kphi_real (&from)[KPHI_MAX_CORNERS][2],
+                                                       int count) noexcept {
+  if (count < 0 || count > KPHI_MAX_CORNERS) return std::nullopt;
   Position corners[KPHI_MAX_CORNERS];
-  const auto count = static_cast<std::size_t>(airframe.corner_count);
-  for (std::size_t i = 0; i < count; ++i) corners[i] = at(airframe.corners[i]);
-  const auto outline = ConvexPolygon::from(corners, count);
-  if (!outline) return std::nullopt;
-  PolygonBody body{*outline, Rotors<Hinge>(rotors_of(airframe))};
-  for (std::size_t i = 0; i < body.hinges.size(); ++i) {
-    body.hinges[i] = {at(airframe.hinges[i]), Radians(airframe.hinge_turn_rad[i]), airframe.mirrored[i] != 0};
-  }
-  return body;
+  for (int i = 0; i < count; ++i) corners[i] = at(from[i]);
+  return ConvexPolygon::from(corners, static_cast<std::size_t>(count));
 }
 
-Airframe airframe_of(const kphi_airframe& from, OverlapMeasure overlap) noexcept {
-  Airframe airframe{Metres(from.half_side), Metres(from.arm_length), Metres(from.propeller_radius),
-                    RadPerSec(from.slowest_speed), RadPerSec(from.fastest_speed)};
-  airframe.overlap = overlap;
+/// False: of these corners no outline can be made.
+KPHI_BY_ITSELF bool put_body(const kphi_airframe& from, Airframe& airframe) noexcept {
+  const auto outline = outline_of(from.corners, from.corner_count);
+  if (!outline) return false;
+  airframe.polygon.emplace(*outline);
+  for (std::size_t i = 0; i < rotors_of(from); ++i)
+    airframe.polygon->hinges.add({at(from.hinges[i]), Radians(from.hinge_turn_rad[i]), from.mirrored[i] != 0});
+  for (std::size_t i = 0; i < PolygonBody::kMostMore; ++i) {
+    if (from.more_corner_counts[i] == 0) continue;
+    auto& part = airframe.polygon->more[i];
+    part = outline_of(from.more_corners[i], from.more_corner_counts[i]);
+    if (!part) return false;
+  }
+  return true;
+}
+
+/// An airframe on its way, and whether its body is one.
+struct Told {
+  const kphi_airframe* from;
+  mutable bool bad_outline = false;
+};
+
+void put_airframe(const void* told, Airframe& airframe) noexcept {
+  const kphi_airframe& from = *static_cast<const Told*>(told)->from;
+  airframe.half_side = Metres(from.half_side);
+  airframe.arm_length = Metres(from.arm_length);
+  airframe.propeller_radius = Metres(from.propeller_radius);
+  airframe.slowest_speed = RadPerSec(from.slowest_speed);
+  airframe.fastest_speed = RadPerSec(from.fastest_speed);
+  airframe.overlap = static_cast<OverlapMeasure>(from.overlap);
   for (std::size_t i = 0; i < 4; ++i) {
     airframe.hinge_turns[i] = from.hinge_turns[i];
     airframe.mirrored[i] = from.mirrored[i] != 0;
   }
-  if (from.propellers_differ != 0) airframe.propeller_radii = taken<Metres>(from.propeller_radii, rotors_of(from));
+  for (std::size_t i = 0; from.propellers_differ != 0 && i < rotors_of(from); ++i)
+    airframe.propeller_radii.add(Metres(from.propeller_radii[i]));
   if (from.has_arm_limits != 0) {
-    airframe.arms = {Radians(from.arm_from_rad), Radians(from.arm_to_rad), Radians(from.arm_stale_rad)};
+    airframe.arms.from = Radians(from.arm_from_rad);
+    airframe.arms.to = Radians(from.arm_to_rad);
+    airframe.arms.stale = Radians(from.arm_stale_rad);
+    if (!(std::fabs(from.arm_oldest_s) <= 0)) airframe.arms.oldest = Seconds(from.arm_oldest_s);
+    if (!(std::fabs(from.hub_stale_m) <= 0)) airframe.arms.stale_hub = Metres(from.hub_stale_m);
   }
-  return airframe;
+  if (from.corner_count != 0) static_cast<const Told*>(told)->bad_outline = !put_body(from, airframe);
 }
 
 RotorLayout layout_of(std::size_t count, const kphi_real (*hubs)[2], const int* spins) noexcept {
@@ -145,27 +195,20 @@ const char* kphi_compensation_version(void) { return KPHI_COMPENSATION_VERSION; 
 
 int kphi_compensator_build(kphi_compensator* out, const kphi_curve* curves, const kphi_airframe* airframe, int law) {
   if (law != KPHI_LAW_CLAMPED && law != KPHI_LAW_PUBLISHED) return kBadLaw;
-  const auto overlap = measure_of(airframe->overlap);
-  if (!overlap) return kBadOverlap;
+  if (!measure_of(airframe->overlap)) return kBadOverlap;
   const std::size_t count = rotors_of(*airframe);
   if (count < kFewestRotors) return static_cast<int>(Refusal::rotors);
-  Airframe frame = airframe_of(*airframe, *overlap);
-  if (airframe->corner_count != 0) {
-    frame.polygon = body_of(*airframe);
-    if (!frame.polygon) return kBadOutline;
+  const Told told{airframe};
+  const Refusal refusal = Compensator::build_at(
+      out->state,
+      {count, curves,
+       [](const void* all, std::size_t rotor) noexcept { return parts_of(static_cast<const kphi_curve*>(all)[rotor]); },
+       &told, put_airframe, static_cast<ScalingLaw>(law)});
+  if (told.bad_outline) {
+    ::new (out->state) Compensator();
+    return kBadOutline;
   }
-  const auto first = curve_of(curves[0]);
-  if (!first) return kBadCurve;
-  Rotors<ThrustCurve> each(count, *first);
-  for (std::size_t i = 1; i < count; ++i) {
-    const auto curve = curve_of(curves[i]);
-    if (!curve) return kBadCurve;
-    each[i] = *curve;
-  }
-  const BuildOutcome outcome = Compensator::build(each, frame, static_cast<ScalingLaw>(law));
-  if (!outcome.compensator) return static_cast<int>(outcome.refusal);
-  ::new (out->state) Compensator(*outcome.compensator);
-  return 0;
+  return refusal == Refusal::curve ? static_cast<int>(kBadCurve) : static_cast<int>(refusal);
 }
 
 const char* kphi_refusal_text(int refusal) {
@@ -178,7 +221,7 @@ const char* kphi_refusal_text(int refusal) {
       "the airframe's overlap measure is none of KPHI_RIM_ARC, KPHI_AREA_SHARE, KPHI_LOAD_SHARE"};
   if (refusal >= kBadCurve && refusal < kBadCurve + static_cast<int>(std::size(kMore)))
     return kMore[refusal - kBadCurve];
-  const bool known = refusal >= 0 && refusal <= static_cast<int>(Refusal::arm_limits);
+  const bool known = refusal >= 0 && refusal <= static_cast<int>(Refusal::knots);
   return known ? describe(static_cast<Refusal>(refusal)) : "unknown refusal";
 }
 
@@ -199,6 +242,18 @@ void kphi_set_moving_arms(kphi_compensator* compensator, const kphi_real* arm_an
                           kphi_real age_s) {
   const std::size_t count = of(compensator).rotors();
   of(compensator).set_arms(taken<Radians>(arm_angles_rad, count), {Seconds(age_s), taken<RadPerSec>(rates, count)});
+}
+
+void kphi_set_hubs(kphi_compensator* compensator, const kphi_real (*hubs)[2], const kphi_real* speeds,
+                   kphi_real age_s) {
+  const std::size_t count = of(compensator).rotors();
+  Rotors<HubPosition> places;
+  HubFeedback feedback{Seconds(age_s), {}};
+  for (std::size_t i = 0; i < count; ++i) {
+    places.add(at(hubs[i]));
+    if (speeds != nullptr) feedback.speeds.add(speeds[i]);
+  }
+  of(compensator).set_hubs(places, feedback);
 }
 
 void kphi_speeds_for(const kphi_compensator* compensator, const kphi_real* thrusts_n, kphi_real* speeds_rad_s,
@@ -253,21 +308,23 @@ void kphi_hubs(const kphi_compensator* compensator, const kphi_masses* masses, k
   }
 }
 
-void kphi_speed_uncertainties(const kphi_compensator* compensator, const kphi_real* thrusts_n,
+void kphi_speed_uncertainties(const kphi_compensator* compensator, const kphi_curve* curves, const kphi_real* thrusts_n,
                               kphi_real arm_angle_uncertainty_rad, kphi_real* uncertainties_rad_s) {
   const Compensator& known = of(compensator);
-  hand_out(known.speed_uncertainties(taken<Newtons>(thrusts_n, known.rotors()), Radians(arm_angle_uncertainty_rad)),
-           uncertainties_rad_s);
+  const SpeedCommand command = known.speeds_for(taken<Newtons>(thrusts_n, known.rotors()));
+  for (std::size_t i = 0; i < known.rotors(); ++i) {
+    const auto curve = curve_of(curves[i]);
+    uncertainties_rad_s[i] =
+        curve ? known.speed_uncertainty(i, *curve, command.speeds[i], Radians(arm_angle_uncertainty_rad)).value()
+              : std::numeric_limits<kphi_real>::infinity();
+  }
 }
 
 int kphi_mixer_build(kphi_mixer* out, int rotors, const kphi_real (*hubs)[2], const int* spins,
                      kphi_real drag_per_newton, kphi_real drag_per_square_newton) {
   if (rotors < static_cast<int>(kFewestRotors) || rotors > KPHI_MAX_ROTORS) return 0;
-  const auto mixer = Mixer::build(layout_of(static_cast<std::size_t>(rotors), hubs, spins),
-                                  {Metres(drag_per_newton), drag_per_square_newton});
-  if (!mixer) return 0;
-  ::new (out->state) Mixer(*mixer);
-  return 1;
+  const RotorLayout layout = layout_of(static_cast<std::size_t>(rotors), hubs, spins);
+  return (::new (out->state) Mixer())->rebuild(layout, {Metres(drag_per_newton), drag_per_square_newton}) ? 1 : 0;
 }
 
 int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const int* spins,
@@ -278,10 +335,9 @@ int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const i
 
 int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n,
              const kphi_real* largest_n, kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]) {
-  const std::size_t count = of(mixer).rotors();
   const MixedThrusts mixed =
       of(mixer).mix({Newtons(wrench[0]), NewtonMetres(wrench[1]), NewtonMetres(wrench[2]), NewtonMetres(wrench[3])},
-                    {taken<Newtons>(smallest_n, count), taken<Newtons>(largest_n, count)}, NewtonMetres(assured_yaw));
+                    smallest_n, largest_n, NewtonMetres(assured_yaw));
   hand_out(mixed.thrusts, thrusts_n);
   if (achieved != nullptr) {
     achieved[0] = mixed.achieved.thrust.value();

@@ -1,4 +1,4 @@
-// The library that flies, for C, for C++ before C++17 and for stacks that speak arrays: the classes Compensator and
+// The library that flies, for C99, for C++ before C++17 and for stacks that speak arrays: the classes Compensator and
 // Mixer of compensator.hpp and mixing.hpp, number for number. Angles [rad], lengths [m], thrusts [N], torques [N m],
 // speeds [rad/s], coefficients [N/(rad/s)^2]; rotors in the order 0, 1, 2 .. (the paper's 1, 2, 3 ..). Links with a C
 // compiler: needs only the mathematics library.
@@ -49,7 +49,13 @@ enum {
   KPHI_ARM_ANGLE_STALE = 512
 };
 // What the mixer gave up (mixing.hpp).
-enum { KPHI_GAVE_YAW = 1, KPHI_GAVE_THRUST = 2, KPHI_GAVE_ROLL_PITCH = 4, KPHI_DEMAND_NAN = 8 };
+enum {
+  KPHI_GAVE_YAW = 1,
+  KPHI_GAVE_THRUST = 2,
+  KPHI_GAVE_ROLL_PITCH = 4,
+  KPHI_DEMAND_NAN = 8,
+  KPHI_MIX_UNFINISHED = 16
+};
 // What deserves a look before a curve is flown (compensator.hpp).
 enum { KPHI_GAINS_WITH_OCCLUSION = 1, KPHI_STEPS_AT_CONTACT = 2 };
 
@@ -88,7 +94,7 @@ typedef struct kphi_curve {
 // counter-clockwise, hub i at hinges[i] + arm_length (cos b, sin b), b = turn + theta (turn - theta if mirrored).
 typedef struct kphi_airframe {
   kphi_real half_side;
-  kphi_real arm_length;        // > every propeller radius
+  kphi_real arm_length;        // > 0; on the square > every propeller radius
   kphi_real propeller_radius;  // > 0
   kphi_real slowest_speed;     // >= 0
   kphi_real fastest_speed;
@@ -105,7 +111,11 @@ typedef struct kphi_airframe {
   int has_arm_limits;      // 0: -100 to 190 degrees and 2 degrees
   kphi_real arm_from_rad;  // an angle below it or above arm_to_rad is not believed
   kphi_real arm_to_rad;
-  kphi_real arm_stale_rad;  // how far an arm may have moved since its angle was measured
+  kphi_real arm_stale_rad;    // how far an arm may have moved since its angle was measured
+  kphi_real arm_oldest_s;     // an angle older than this is stale whatever its rate; 0: 0.5 s
+  kphi_real hub_stale_m;      // as arm_stale_rad, for kphi_set_hubs; 0: 0.004 m
+  int more_corner_counts[2];  // of up to two further convex parts of the body, which must not overlap; 0: none
+  kphi_real more_corners[2][KPHI_MAX_CORNERS][2];
 } kphi_airframe;
 
 // What moves the centre of gravity with the arms [kg, m]. An arm's beam counts half at its hub, half with the body.
@@ -117,10 +127,11 @@ typedef struct kphi_masses {
 
 // Opaque; plain bytes. Arrays in the calls below hold a number for each of its rotors.
 typedef struct kphi_compensator {
-  double state[1280];
+  kphi_real state[512];
 } kphi_compensator;
 
-// 0, or why not: kphi_refusal_text() says it in words. Nothing is built then. A curve for each rotor.
+// 0, or why not: kphi_refusal_text() says it in words; `out` has no rotors then, and its calls do nothing. A curve for
+// each rotor; the tables that differ may have 96 knots together.
 int kphi_compensator_build(kphi_compensator* out, const kphi_curve* curves, const kphi_airframe* airframe, int law);
 const char* kphi_refusal_text(int refusal);
 // The sum of what speaks against flying the curve (KPHI_GAINS_WITH_OCCLUSION, KPHI_STEPS_AT_CONTACT); -1: it is none.
@@ -133,6 +144,9 @@ void kphi_set_arms(kphi_compensator* compensator, const kphi_real* arm_angles_ra
 // one may have moved too far since.
 void kphi_set_moving_arms(kphi_compensator* compensator, const kphi_real* arm_angles_rad, const kphi_real* rates,
                           kphi_real age_s);
+// Instead of these two: hubs [x, y] in the body frame [m], measured age_s ago, moving at these speeds [m/s, may be
+// null]. For arms that get longer, of several joints, or measured by where their hubs are.
+void kphi_set_hubs(kphi_compensator* compensator, const kphi_real (*hubs)[2], const kphi_real* speeds, kphi_real age_s);
 // At control rate: sqrt(max(T, 0)/(K_T k_i)) (equation 4), held within the speed limits. NaN counts as no thrust.
 // `flags`, the sum of the flags above per rotor, may be null.
 void kphi_speeds_for(const kphi_compensator* compensator, const kphi_real* thrusts_n, kphi_real* speeds_rad_s,
@@ -158,13 +172,14 @@ void kphi_thrust_max(const kphi_compensator* compensator, kphi_real* thrusts_n);
 void kphi_drag_scale(const kphi_compensator* compensator, kphi_real* scales);
 // Hubs about the centre of gravity of the shape of the last arm angles, for the mixer; NaN before the first.
 void kphi_hubs(const kphi_compensator* compensator, const kphi_masses* masses, kphi_real (*hubs)[2]);
-// Standard uncertainty of the speeds; HUGE_VAL where none can be given. Not for the control loop.
-void kphi_speed_uncertainties(const kphi_compensator* compensator, const kphi_real* thrusts_n,
+// Standard uncertainty of the speeds, from that of the curves it was built of, which it does not keep; HUGE_VAL where
+// none can be given. Not for the control loop.
+void kphi_speed_uncertainties(const kphi_compensator* compensator, const kphi_curve* curves, const kphi_real* thrusts_n,
                               kphi_real arm_angle_uncertainty_rad, kphi_real* uncertainties_rad_s);
 
 // Opaque; plain bytes.
 typedef struct kphi_mixer {
-  double state[128];
+  kphi_real state[96];
 } kphi_mixer;
 
 // 1 if the layout can be flown. 3 to 8 hubs [x, y] relative to the centre of gravity, x forward, y left; spins +1 or
@@ -176,9 +191,9 @@ int kphi_mixer_build(kphi_mixer* out, int rotors, const kphi_real (*hubs)[2], co
 // flown: a number is not finite, a spin neither +1 nor -1, or the rotors cannot make every torque.
 int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const int* spins, const kphi_real* drag_scale);
 // At control rate: thrusts f = A^-1 wrench within the limits, wrench = [thrust N, roll, pitch, yaw N m], A's columns
-// [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (no further than to
-// assured_yaw), collective thrust, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_..,
-// KPHI_DEMAND_NAN), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
+// [1; y_i; -x_i; s_i kappa_i(f_i)]. What the limits do not allow is given up in the order yaw (down to assured_yaw),
+// collective thrust, assured yaw, roll and pitch. Returns the sum of what was given up (KPHI_GAVE_.., KPHI_DEMAND_NAN,
+// KPHI_MIX_UNFINISHED: the search ended early), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
 int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n,
              const kphi_real* largest_n, kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -11,50 +13,38 @@ constexpr Real kLargestDemand = Real(1e9);  // N, N m: beyond it the arithmetic 
 constexpr Real kLargestDragScale = Real(1e6), kSmallestDragScale = Real(1e-6);
 constexpr Real kSmallestTorque = Real(1e-9);  // N m per N
 constexpr bool kDouble = sizeof(Real) == sizeof(double);
-constexpr int kTorqueIterations = 10;
-constexpr int kSearches = 4;
-constexpr int kHalvings = 20;
+constexpr int kTorqueIterations = kDouble ? 8 : 5;
+constexpr int kSearches = 2;
+constexpr int kCorrections = 6;
 constexpr Real kYawTolerance = kDouble ? Real(1e-13) : Real(1e-5);
-constexpr Real kTorqueTolerance = kDouble ? Real(1e-9) : Real(1e-5);
 /// Shares of a vehicle's sizes below which its rotors count as unable to make a torque.
 constexpr Real kFlat = Real(1e-6);
 /// How far, relative to what the rotors can give, a demand may be missed that is only rounding.
 constexpr Real kRounding = kDouble ? Real(1e-9) : Real(1e-4);
 
-/// f = from + distance along.
-Row moved(const Row& from, Real distance, const Row& along) noexcept {
-  Row result = from;
-  for (std::size_t i = 0; i < result.size(); ++i) result[i] += distance * along[i];
-  return result;
-}
-
-bool usable(const RotorLayout& layout, const Row& drag_scale) noexcept {
+bool usable(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
   const std::size_t count = layout.hubs.size();
-  if (count < kFewestRotors || layout.spins.size() != count || drag_scale.size() != count) return false;
+  if (count < kFewestRotors || layout.spins.size() != count) return false;
+  if (drag_scale.size() != 0 && drag_scale.size() != count) return false;
   for (std::size_t i = 0; i < count; ++i) {
     const Real x = layout.hubs[i].x.value(), y = layout.hubs[i].y.value();
     if (!(std::fabs(x) < Real(1e6)) || !(std::fabs(y) < Real(1e6))) return false;
     if (layout.spins[i] != 1 && layout.spins[i] != -1) return false;
-    if (!(drag_scale[i] > kSmallestDragScale) || !(drag_scale[i] < kLargestDragScale)) return false;
+    const Real scale = drag_scale.size() == 0 ? Real(1) : drag_scale[i];
+    if (!(scale > kSmallestDragScale) || !(scale < kLargestDragScale)) return false;
   }
   return true;
 }
 
 Real within_reason(Real demand, bool& odd) noexcept {
-  odd = odd || std::isnan(demand);
-  return std::isnan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
+  odd = odd || is_nan(demand);
+  return is_nan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
 }
 
-WithinLimits::Limits within_reason(const ThrustLimits& limits, std::size_t count, bool& odd) noexcept {
-  WithinLimits::Limits result{Row(count), Row(count)};
-  for (std::size_t i = 0; i < count; ++i) {
-    const Real low = i < limits.smallest.size() ? limits.smallest[i].value() : Real(0);
-    const Real high = i < limits.largest.size() ? limits.largest[i].value() : Real(0);
-    odd = odd || !(low <= high);
-    result.low[i] = low > 0 ? std::min(low, kLargestDemand) : Real(0);
-    result.high[i] = high > result.low[i] ? std::min(high, kLargestDemand) : result.low[i];
-  }
-  return result;
+void within_reason(std::size_t i, Real low, Real high, WithinLimits::Limits& held, bool& odd) noexcept {
+  odd = odd || is_nan(low) || is_nan(high) || low > high;
+  held.low[i] = low > 0 ? std::min(low, kLargestDemand) : Real(0);
+  held.high[i] = high > held.low[i] ? std::min(high, kLargestDemand) : held.low[i];
 }
 
 bool within(const Row& thrusts, const WithinLimits::Limits& limits) noexcept {
@@ -77,59 +67,69 @@ Real size_of(const Row& row) noexcept {
   return most;
 }
 
-Row negative(Row row) noexcept {
-  for (Real& value : row) value = -value;
-  return row;
+/// Limits far beyond anything that matters would hide in their rounding what does.
+void keep_in_reach(WithinLimits::Limits& limits, const Row& wanted) noexcept {
+  constexpr Real kFar = kDouble ? Real(1e3) : Real(1e2);
+  const Real most = kFar * std::max(size_of(wanted), size_of(limits.low));
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    limits.high[i] = std::max(std::min(limits.high[i], most), limits.low[i]);
 }
 
 }  // namespace
 
 std::optional<Mixer> Mixer::build(const RotorLayout& layout, DragTorque drag) noexcept {
+  std::optional<Mixer> mixer;
+  if (!mixer.emplace().rebuild(layout, drag)) mixer.reset();
+  return mixer;
+}
+
+bool Mixer::rebuild(const RotorLayout& layout, DragTorque drag) noexcept {
   const Real per_newton = drag.per_newton.value();
   if (!(per_newton > kSmallestTorque) || !(per_newton < Real(1e6)) ||
       !(std::fabs(drag.per_square_newton) < Real(1e6))) {
-    return std::nullopt;
+    return false;
   }
-  Mixer mixer(drag);
-  if (!mixer.set_layout(layout)) return std::nullopt;
-  return mixer;
+  const DragTorque before = drag_;
+  drag_ = drag;
+  if (set_layout(layout)) return true;
+  drag_ = before;
+  return false;
 }
 
 bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
   const std::size_t count = layout.hubs.size();
-  Mixer next(drag_);
-  next.drag_scale_ = drag_scale.size() == 0 ? Row(count, 1) : drag_scale;
-  if (!usable(layout, next.drag_scale_)) return false;
-  next.x_ = next.y_ = next.spins_ = Row(count);
+  if (!usable(layout, drag_scale)) return false;
+  Mixer next;
+  next.drag_ = drag_;
+  next.resize(count);
   const Real share = 1 / static_cast<Real>(count);
   Real mean_x = 0, mean_y = 0;
   for (std::size_t i = 0; i < count; ++i) {
     next.x_[i] = layout.hubs[i].x.value();
     next.y_[i] = layout.hubs[i].y.value();
+    next.drag_scale_[i] = drag_scale.size() == 0 ? Real(1) : drag_scale[i];
     next.spins_[i] = static_cast<Real>(layout.spins[i]);
     mean_x += next.x_[i] * share;
     mean_y += next.y_[i] * share;
   }
-  Row x = next.x_, y = next.y_;  // about their mean
-  Real reach = 0, xx = 0, xy = 0, yy = 0;
+  Real reach = 0, xx = 0, xy = 0, yy = 0;  // about their mean
   for (std::size_t i = 0; i < count; ++i) {
-    x[i] -= mean_x;
-    y[i] -= mean_y;
-    xx += x[i] * x[i];
-    xy += x[i] * y[i];
-    yy += y[i] * y[i];
-    reach = std::max({reach, std::fabs(x[i]), std::fabs(y[i])});
+    const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
+    xx += x * x;
+    xy += x * y;
+    yy += y * y;
+    reach = std::max({reach, std::fabs(x), std::fabs(y)});
   }
   const Real determinant = xx * yy - xy * xy;
   if (!(determinant > kFlat * reach * reach * reach * reach)) return false;
   // The least squares of all thrusts that make a roll about the mean are along y and x, the thrust is 1/n of each.
-  next.per_thrust_ = next.per_roll_ = next.per_pitch_ = Row(count);
   for (std::size_t i = 0; i < count; ++i) {
-    next.per_roll_[i] = (xx * y[i] - xy * x[i]) / determinant;
-    next.per_pitch_[i] = (xy * y[i] - yy * x[i]) / determinant;
+    const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
+    next.per_roll_[i] = (xx * y - xy * x) / determinant;
+    next.per_pitch_[i] = (xy * y - yy * x) / determinant;
     next.per_thrust_[i] = share - mean_y * next.per_roll_[i] + mean_x * next.per_pitch_[i];
+    next.arms_[i] = next.spins_[i] * next.drag_scale_[i] * drag_.per_newton.value();
   }
-  next.arms_ = next.yaw_arms(Row(count));
   next.free_ = next.torque_free(next.arms_);
   const Real square = dot(next.free_, next.free_);
   next.yaws_ = count > kFewestRotors;
@@ -138,15 +138,22 @@ bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale
   return true;
 }
 
-Row Mixer::yaw_arms(const Row& thrusts) const noexcept {
-  const Real per_newton = drag_.per_newton.value();
-  Row arms(rotors());
+void Mixer::resize(std::size_t count) noexcept {
+  for (Row* row : {&x_, &y_, &per_thrust_, &per_roll_, &per_pitch_, &arms_, &free_, &drag_scale_, &spins_})
+    *row = Row(count);
+}
+
+Real Mixer::yaw_of(const Row& thrusts, Row& slopes) const noexcept {
+  const Real per_newton = drag_.per_newton.value(), most = 2 * per_newton, least = per_newton / 2;
+  Real yaw = 0;
   for (std::size_t i = 0; i < rotors(); ++i) {
-    const Real uncovered = drag_scale_[i] * std::max(thrusts[i], Real(0));
-    const Real torque = per_newton + drag_.per_square_newton * uncovered;
-    arms[i] = spins_[i] * drag_scale_[i] * std::min(std::max(torque, per_newton / 2), 2 * per_newton);
+    const Real bend = drag_.per_square_newton * drag_scale_[i] * std::max(thrusts[i], Real(0));
+    const Real torque = per_newton + bend, held = std::min(std::max(torque, least), most);
+    const Real arm = spins_[i] * drag_scale_[i];
+    yaw += arm * held * thrusts[i];
+    slopes[i] = arm * (torque < least || torque > most ? held : torque + bend);
   }
-  return arms;
+  return yaw;
 }
 
 Row Mixer::torque_free(const Row& arms) const noexcept {
@@ -160,96 +167,169 @@ Row Mixer::torque_free(const Row& arms) const noexcept {
   return rest;
 }
 
-void Mixer::add_yaw(Row& thrusts, Real yaw, Row& arms) const noexcept {
-  const auto give = [&](const Row& free) { return moved(thrusts, (yaw - dot(arms, thrusts)) / dot(free, free), free); };
-  Row given = give(free_);
-  for (int i = 0; i < kTorqueIterations && std::fabs(drag_.per_square_newton) > 0; ++i) {
-    arms = yaw_arms(given);
-    const Row free = torque_free(arms);
-    if (std::fabs(dot(arms, given) - yaw) <= kYawTolerance * dot(free, free)) break;
-    given = give(free);
+void Mixer::add_yaw(Row& thrusts, Real yaw, const WithinLimits::Limits& limits) const noexcept {
+  const Row without = thrusts;
+  Row along = free_, slopes = arms_;
+  Real share = (yaw - dot(arms_, without)) / dot(along, along);
+  for (int i = 0; i < kTorqueIterations; ++i) {
+    for (std::size_t j = 0; j < rotors(); ++j) thrusts[j] = without[j] + share * along[j];
+    if (!bends() || (i > 1 && !within(thrusts, limits))) return;  // beyond the limits it is to be searched for
+    const Real off = yaw - yaw_of(thrusts, slopes);
+    // Four rotors have one direction for it, more of them that of the slopes which they have about there.
+    if (i == 0 && rotors() > 4) along = torque_free(slopes);
+    const Real steep = dot(slopes, along);
+    if ((i > 0 && std::fabs(off) <= kYawTolerance * std::fabs(steep)) || !(std::fabs(steep) > 0)) return;
+    share += off / steep;
   }
-  thrusts = given;
 }
 
-Row Mixer::give_up(const Row& wanted, const Asked& asked, const WithinLimits::Limits& held, Real assured,
-                   int& steps) const noexcept {
-  const Range promised = yaw_from(0, asked.yaw), kept = yaw_from(assured, asked.yaw);
-  const auto search_with = [&](const Row& arms) {
-    WithinLimits search(held, wanted);
-    if (yaws_) search.reach(arms, promised, WithinLimits::Keep::within);
-    search.reach(y_, negative(x_), asked.roll, asked.pitch);
-    if (yaws_) search.reach(arms, kept, WithinLimits::Keep::within);
-    search.reach(Row(rotors(), 1), {asked.thrust, asked.thrust});
-    if (yaws_) search.reach(arms, {asked.yaw, asked.yaw}, WithinLimits::Keep::within);
-    steps += search.steps();
-    return search.thrusts();
-  };
-  Row arms = yaw_arms(wanted), given = search_with(arms);
-  if (!yaws_ || !(std::fabs(drag_.per_square_newton) > 0)) return given;
-  // What yaw is out of its promise by, with the torque of these thrusts.
-  const auto out_by = [&](const Row& thrusts) {
-    const Real yaw = dot(yaw_arms(thrusts), thrusts);
-    return std::fabs(yaw - std::min(std::max(yaw, promised.low), promised.high));
-  };
-  Row safe = held.low;
-  for (int i = 1; i < kSearches; ++i) {
-    const Row next = yaw_arms(given);
-    if (std::fabs(dot(next, given) - dot(arms, given)) <= kTorqueTolerance * size_of(arms) * size_of(given)) break;
-    if (!(out_by(given) > 0)) safe = given;
-    arms = next;
-    given = search_with(arms);
+void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured, Row& thrusts) const noexcept {
+  const Range kept = yaw_from(assured, asked.yaw);
+  const int searches = bends() ? kSearches : 1;
+  Row slopes(rotors());
+  for (int i = 0; i < searches; ++i) {
+    search.thrusts(thrusts);
+    const Real now = yaw_of(thrusts, slopes);
+    search.set_yaw(slopes, now);
+    search.reach(WithinLimits::Goal::yaw, kept);
+    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
+    search.reach(WithinLimits::Goal::yaw, {asked.yaw, asked.yaw});
+    if (i == 0) search.ease();
+    for (int j = 0; bends() && j < (i + 1 < searches ? 1 : kCorrections); ++j) {
+      search.thrusts(thrusts);
+      if (!search.correct_yaw(search.yaw() - yaw_of(thrusts, slopes))) break;
+    }
   }
-  // It may go to and fro between two sets of limits, or end a little outside. Then towards what keeps the promise.
-  if (!(out_by(given) > 0)) return given;
-  Real good = 1, bad = 0;
-  const auto between = [&](Real share) { return moved(moved(given, -share, given), share, safe); };
-  for (int i = 0; i < kHalvings; ++i) {
-    const Real middle = (good + bad) / 2;
-    (out_by(between(middle)) > 0 ? bad : good) = middle;
+}
+
+void Mixer::give_up(Row& thrusts, const Asked& asked, WithinLimits::Limits& held, Real assured,
+                    MixedThrusts& mixed) const noexcept {
+  keep_in_reach(held, thrusts);
+  WithinLimits search(held, thrusts, x_, y_, std::max(size_of(x_), size_of(y_)));
+  search.reach_roll_pitch(asked.roll, asked.pitch);
+  if (yaws_) {
+    search_yaw_and_thrust(search, asked, assured, thrusts);
+  } else {
+    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
   }
-  return between(good);
+  mixed.steps = search.steps();
+  mixed.concessions = mixed.concessions.with(Concession::unfinished, search.cut_short());
+  search.thrusts(thrusts);
 }
 
 MixedThrusts Mixer::mix(const Wrench& demand, const ThrustLimits& limits, NewtonMetres assured_yaw) const noexcept {
+  Real smallest[kMostRotors], largest[kMostRotors];
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    smallest[i] = i < limits.smallest.size() ? limits.smallest[i].value() : Real(0);
+    largest[i] = i < limits.largest.size() ? limits.largest[i].value() : Real(0);
+  }
+  return mix(demand, smallest, largest, assured_yaw);
+}
+
+MixedThrusts Mixer::mix(const Wrench& demand, const Real* smallest, const Real* largest,
+                        NewtonMetres assured_yaw) const noexcept {
   bool odd = false;
-  const Real thrust = within_reason(demand.thrust.value(), odd), roll = within_reason(demand.roll.value(), odd),
-             pitch = within_reason(demand.pitch.value(), odd), yaw = within_reason(demand.yaw.value(), odd);
-  const WithinLimits::Limits held = within_reason(limits, rotors(), odd);
+  WithinLimits::Limits held{Row(rotors()), Row(rotors())};
+  for (std::size_t i = 0; i < rotors(); ++i) within_reason(i, smallest[i], largest[i], held, odd);
+  Real asked[] = {demand.thrust.value(), demand.roll.value(), demand.pitch.value(), demand.yaw.value()};
+  for (Real& one : asked) one = within_reason(one, odd);
 
   Row wanted(rotors());
   for (std::size_t i = 0; i < rotors(); ++i) {
-    wanted[i] = thrust * per_thrust_[i] + roll * per_roll_[i] + pitch * per_pitch_[i];
+    wanted[i] = asked[0] * per_thrust_[i] + asked[1] * per_roll_[i] + asked[2] * per_pitch_[i];
   }
-  Row arms = arms_;
-  if (yaws_) add_yaw(wanted, yaw, arms);
+  if (yaws_) add_yaw(wanted, asked[3], held);
 
   MixedThrusts mixed;
   if (!within(wanted, held))
-    wanted = give_up(wanted, {thrust, roll, pitch, yaw}, held, assured_yaw.value(), mixed.steps);
-  mixed.thrusts = Rotors<Newtons>(rotors());
+    give_up(wanted, {asked[0], asked[1], asked[2], asked[3]}, held, assured_yaw.value(), mixed);
+  mixed.thrusts.resize(rotors());
   Real most = 1;
   for (std::size_t i = 0; i < rotors(); ++i) {
     mixed.thrusts[i] = Newtons(wanted[i]);
     most = std::max(most, std::fabs(wanted[i]));
   }
-  mixed.achieved = wrench_of(mixed.thrusts);
-  const auto missed = [&](Real got, Real asked, Real arm) { return std::fabs(got - asked) > kRounding * most * arm; };
-  const Real arm = std::max(size_of(x_), size_of(y_));
-  mixed.concessions = Concessions()
-                          .with(Concession::demand_nan, odd)
-                          .with(Concession::thrust, missed(mixed.achieved.thrust.value(), thrust, 1))
-                          .with(Concession::roll_pitch, missed(mixed.achieved.roll.value(), roll, arm) ||
-                                                            missed(mixed.achieved.pitch.value(), pitch, arm))
-                          .with(Concession::yaw, missed(mixed.achieved.yaw.value(), yaw, size_of(arms)));
+  mixed.achieved = wrench_of(wanted);
+  const Real rounding = kRounding * most, arm = rounding * std::max(size_of(x_), size_of(y_));
+  const bool thrust = std::fabs(mixed.achieved.thrust.value() - asked[0]) > rounding;
+  const bool roll_pitch = std::fabs(mixed.achieved.roll.value() - asked[1]) > arm ||
+                          std::fabs(mixed.achieved.pitch.value() - asked[2]) > arm;
+  const bool yaw = std::fabs(mixed.achieved.yaw.value() - asked[3]) > rounding * size_of(arms_);
+  mixed.concessions = mixed.concessions.with(Concession::thrust, thrust)
+                          .with(Concession::roll_pitch, roll_pitch)
+                          .with(Concession::yaw, yaw)
+                          .with(Concession::demand_nan, odd);
   return mixed;
 }
 
 Wrench Mixer::wrench_of(const Rotors<Newtons>& thrusts) const noexcept {
   Row f(rotors());
+  for (std::size_t i = 0; i < rotors(); ++i) f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
+  return wrench_of(f);
+}
+
+Wrench Mixer::wrench_of(const Row& thrusts) const noexcept {
+  Row slopes(rotors());
+  Real sum = 0, roll = 0, pitch = 0;
+  for (std::size_t i = 0; i < rotors(); ++i) {
+    sum += thrusts[i];
+    roll += y_[i] * thrusts[i];
+    pitch -= x_[i] * thrusts[i];
+  }
+  return {Newtons(sum), NewtonMetres(roll), NewtonMetres(pitch), NewtonMetres(yaw_of(thrusts, slopes))};
+}
+
+namespace {
+
+/// Of the first `size` of these columns, with the rows from `row` on.
+Real determinant(const Real (*columns[4])[4], std::size_t row, std::size_t size) noexcept {
+  if (size == 1) return (*columns[0])[row];
   Real sum = 0;
-  for (std::size_t i = 0; i < rotors(); ++i) sum += f[i] = i < thrusts.size() ? thrusts[i].value() : Real(0);
-  return {Newtons(sum), NewtonMetres(dot(y_, f)), NewtonMetres(-dot(x_, f)), NewtonMetres(dot(yaw_arms(f), f))};
+  for (std::size_t k = 0; k < size; ++k) {
+    const Real(*others[4])[4];
+    for (std::size_t i = 0, to = 0; i < size; ++i) {
+      if (i != k) others[to++] = columns[i];
+    }
+    const Real part = (*columns[k])[row] * determinant(others, row + 1, size - 1);
+    sum += k % 2 == 0 ? part : -part;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Real condition_of(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
+  constexpr Real kNoise = Real(1e-7);
+  const std::size_t count = layout.hubs.size();
+  Real columns[kMostRotors][4], reach = 0, arm = 0, least = 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    reach = std::max({reach, std::fabs(layout.hubs[i].x.value()), std::fabs(layout.hubs[i].y.value())});
+    arm = std::max(arm, i < drag_scale.size() ? drag_scale[i] : Real(1));
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const Real scale = i < drag_scale.size() ? drag_scale[i] : Real(1);
+    columns[i][0] = static_cast<Real>(layout.spins[i]) * scale / arm;
+    columns[i][1] = layout.hubs[i].y.value() / reach;
+    columns[i][2] = -layout.hubs[i].x.value() / reach;
+    columns[i][3] = 1;
+  }
+  // Every choice of rotors is a number with a bit for each.
+  for (unsigned chosen = 1; chosen < 1u << count; ++chosen) {
+    const Real(*some[4])[4];
+    std::size_t size = 0;
+    for (std::size_t i = 0; i < count && size <= 4; ++i) {
+      if ((chosen >> i & 1u) == 0) continue;
+      if (size < 4) some[size] = &columns[i];
+      ++size;
+    }
+    if (size < 2 || size > 4) continue;
+    // Two by roll and pitch, three by these and yaw or thrust, four by all.
+    for (std::size_t row = size == 3 || size == 4 ? 0 : 1; row + size <= 4 && row < 2; ++row) {
+      const Real size_of_it = std::fabs(determinant(some, row, size));
+      if (size_of_it > kNoise) least = std::min(least, size_of_it);
+    }
+  }
+  return 1 / least;
 }
 
 }  // namespace kphi::compensation

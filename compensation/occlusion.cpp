@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
@@ -52,7 +54,13 @@ ContactFreeWindow contact_free_window(Metres half_side, Metres arm_length, Metre
 
 Radians occlusion_beside_body(const Airframe& airframe, std::size_t rotor, HubPosition hub) noexcept {
   const Metres radius = radius_of(airframe, rotor);
-  if (airframe.polygon) return occlusion_angle(airframe.polygon->outline, radius, hub, airframe.overlap);
+  if (airframe.polygon) {
+    Radians phi = occlusion_angle(airframe.polygon->outline, radius, hub, airframe.overlap);
+    for (const auto& part : airframe.polygon->more) {
+      if (part) phi = phi + occlusion_angle(*part, radius, hub, airframe.overlap);
+    }
+    return Radians(std::min(phi.value(), 2 * kPi));
+  }
   if (airframe.overlap == OverlapMeasure::rim_arc) return rim_arc(airframe.half_side, radius, hub.x, hub.y);
   return occlusion_angle(ConvexPolygon::square(airframe.half_side), radius, hub, airframe.overlap);
 }

@@ -3,30 +3,35 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 
-std::optional<OcclusionTable> OcclusionTable::from(const Knot* knots, std::size_t count) noexcept {
-  if (count < 2 || count > kMostKnots || std::fabs(knots[0].occlusion.value()) > 0) return std::nullopt;
-  OcclusionTable table;
-  table.count_ = count;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Knot& knot = knots[i];
-    if (!std::isfinite(knot.value) || !(knot.standard_error >= 0)) return std::nullopt;
-    if (i > 0 && !(knot.occlusion > knots[i - 1].occlusion && knot.occlusion.value() <= 2 * kPi)) return std::nullopt;
-    table.knots_[i] = knot;
+bool sound(const KnotList& knots) noexcept {
+  if (knots.count < 2 || knots.count > kMostKnots) return false;
+  Radians before(0);
+  for (std::size_t i = 0; i < knots.count; ++i) {
+    const Knot knot = knots[i];
+    const Real phi = knot.occlusion.value();
+    if (!is_finite(phi) || !is_finite(knot.value) || is_nan(knot.standard_error) || knot.standard_error < 0)
+      return false;
+    if (i == 0 ? std::fabs(phi) > 0 : !(knot.occlusion > before) || phi > 2 * kPi) return false;
+    before = knot.occlusion;
   }
-  return table;
+  return true;
 }
 
-std::size_t OcclusionTable::before(Radians occlusion_angle) const noexcept {
-  std::size_t i = 0;
-  while (i + 2 < count_ && occlusion_angle >= knots_[i + 1].occlusion) ++i;
-  return i;
+KnotList OcclusionTable::list() const noexcept {
+  return {knots_.data(), count_,
+          [](const void* from, std::size_t i) noexcept { return static_cast<const Knot*>(from)[i]; }};
 }
 
-Real OcclusionTable::at(Radians occlusion_angle) const noexcept {
-  const std::size_t i = before(occlusion_angle);
-  return knots_[i].value + slope(i) * (occlusion_angle - knots_[i].occlusion).value();
+std::optional<OcclusionTable> OcclusionTable::from(const Knot* knots, std::size_t count) noexcept {
+  OcclusionTable table;
+  if (count > kMostKnots) return std::nullopt;
+  for (std::size_t i = 0; i < count; ++i) table.knots_[i] = knots[i];
+  table.count_ = count;
+  return sound(table.list()) ? std::optional<OcclusionTable>(table) : std::nullopt;
 }
 
 Real OcclusionTable::slope_at(Radians occlusion_angle) const noexcept { return slope(before(occlusion_angle)); }
@@ -36,7 +41,7 @@ Real OcclusionTable::standard_error_at(Radians occlusion_angle) const noexcept {
   const Real share = (occlusion_angle - knots_[i].occlusion).value() / width(i);
   const Real first = knots_[i].standard_error, change = knots_[i + 1].standard_error - first;
   const Real u = std::hypot(first + change * share, bend_error_at(occlusion_angle));
-  return std::isnan(u) ? std::numeric_limits<Real>::infinity() : u;  // where both knots are unknown
+  return is_nan(u) ? std::numeric_limits<Real>::infinity() : u;  // where both knots are unknown
 }
 
 Real OcclusionTable::bend(std::size_t knot) const noexcept {

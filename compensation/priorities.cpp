@@ -2,180 +2,384 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <utility>
+
+#include "compensation/strict_math.hpp"
 
 namespace kphi::compensation {
 namespace {
 
-/// Squares of lengths below this share are rounding.
-constexpr Real kNothing = sizeof(Real) == sizeof(double) ? Real(1e-20) : Real(1e-10);
-/// And lengths.
-constexpr Real kRounding = sizeof(Real) == sizeof(double) ? Real(1e-13) : Real(1e-6);
+constexpr bool kDouble = sizeof(Real) == sizeof(double);
+/// Entries of the dictionary, and sines of angles between rotors, below which nothing is gained: two rotors so close to
+/// parallel count as parallel. In double, too, for hubs that were told in float.
+constexpr Real kFlat = Real(1e-5);
+/// Entries that are rounding.
+constexpr Real kZero = kDouble ? Real(1e-10) : Real(1e-5);
+/// Changes of thrust that are, as a share of the largest.
+constexpr Real kRounding = kDouble ? Real(1e-13) : Real(1e-6);
+constexpr Real kFree = Real(1e30);
+/// Steps on the spot after which the order of the variables decides (Bland's rule): so it cannot go round in a circle.
+constexpr int kPatience = 3;
+constexpr int kEasings = 4;
+constexpr Real kEased = kDouble ? Real(1e-9) : Real(3e-5);
 
-void add(Row& to, Real factor, const Row& row) noexcept {
-  for (std::size_t i = 0; i < to.size(); ++i) to[i] += factor * row[i];
-}
-
-/// How large a·f can become.
-Real size_of(const Row& row, const Row& high) noexcept {
-  Real sum = 0;
-  for (std::size_t i = 0; i < row.size(); ++i) sum += std::fabs(row[i]) * high[i];
-  return sum;
-}
+Real nearest(Real value, Range range) noexcept { return std::min(std::max(value, range.low), range.high); }
 
 }  // namespace
 
-WithinLimits::WithinLimits(const Limits& limits, const Row& start) noexcept
-    : low_(limits.low), high_(limits.high), thrusts_(start) {
-  for (std::size_t i = 0; i < start.size(); ++i) {
-    free_[i] = start[i] > low_[i] && start[i] < high_[i];
-    if (!free_[i]) thrusts_[i] = start[i] > low_[i] ? high_[i] : low_[i];
+WithinLimits::WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Real reach) noexcept
+    : limits_(limits), rotors_(start.size()), columns_count_(start.size()), reach_(reach) {
+  Real largest = 0;
+  for (std::size_t g = kMostRotors; g < kVariables; ++g) {
+    low_[g] = -kFree;
+    high_[g] = kFree;
+    rows_[g - kMostRotors] = static_cast<std::uint8_t>(g);
   }
-}
-
-Real WithinLimits::free_dot(const Row& a, const Row& b) const noexcept {
-  Real sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += free_[i] ? a[i] * b[i] : Real(0);
-  return sum;
-}
-
-Row WithinLimits::reduced(Row row, const Basis& basis) const noexcept {
-  for (int pass = 0; pass < 2; ++pass) {  // one leaves what rounding let through
-    for (std::size_t k = 0; k < basis.size; ++k) add(row, -free_dot(row, basis.rows[k]), basis.rows[k]);
+  for (std::size_t i = 0; i < columns_count_; ++i) {
+    low_[i] = limits.low[i];
+    high_[i] = limits.high[i];
+    largest = std::max(largest, high_[i]);
+    const Real f = values_[i] = nearest(start[i], {low_[i], high_[i]});
+    entries_[0][i] = y[i] / reach;
+    entries_[1][i] = -x[i] / reach;
+    entries_[2][i] = 1;
+    for (std::size_t row = 0; row < 3; ++row) values_[kMostRotors + row] += entries_[row][i] * f;
+    columns_[i] = static_cast<std::uint8_t>(i);
   }
-  return row;
+  nothing_ = kRounding * largest;
 }
 
-WithinLimits::Basis WithinLimits::basis() const noexcept {
-  Basis basis;
-  const auto take = [&](const Row& row) {
-    Row rest = reduced(row, basis);
-    const Real square = free_dot(rest, rest);
-    if (!(square > kNothing * dot(row, row))) return false;
-    const Real scale = 1 / std::sqrt(square);
-    for (Real& value : rest) value *= scale;
-    basis.rows[basis.size++] = rest;
+bool WithinLimits::cut_to_polygon(Real (&point)[2]) noexcept {
+  // Its middle is that of the limits; from there it is as wide on either side. Edge i is along what rotor i makes.
+  const Real *gx = entries_[0], *gy = entries_[1];
+  Real wide[kMostRotors], spans[kMostRotors] = {}, x = point[0], y = point[1];
+  for (std::size_t i = 0; i < rotors_; ++i) {
+    const Real middle = (low_[i] + high_[i]) / 2;
+    wide[i] = (high_[i] - low_[i]) / 2;
+    x -= middle * gx[i];
+    y -= middle * gy[i];
+    for (std::size_t j = 0; j < i; ++j) {
+      const Real across = std::fabs(gx[i] * gy[j] - gy[i] * gx[j]);
+      spans[i] += across * wide[j];
+      spans[j] += across * wide[i];
+    }
+  }
+  Real square = kFree, nx = 0, ny = 0, to_x = 0, to_y = 0;
+  for (std::size_t i = 0; i < rotors_; ++i) {
+    const Real off = y * gx[i] - x * gy[i], beyond = std::fabs(off) - spans[i];
+    if (!(beyond > 0)) continue;
+    const Real length = std::sqrt(gx[i] * gx[i] + gy[i] * gy[i]), out = beyond / length;
+    if (!(out > nothing_) || !(length > kFlat)) continue;
+    const Real ex = gx[i] / length, ey = gy[i] / length, side = off < 0 ? Real(-1) : Real(1);
+    Real middle = 0, half = 0;  // of the edge, along it
+    for (std::size_t j = 0; j < rotors_; ++j) {
+      const Real across = (gy[j] * ex - gx[j] * ey) * side, along = (gx[j] * ex + gy[j] * ey) * wide[j];
+      if (std::fabs(across) > kFlat) {
+        middle += across > 0 ? along : -along;
+      } else {
+        half += std::fabs(along);
+      }
+    }
+    const Real here = x * ex + y * ey, beside = here - nearest(here, {middle - half, middle + half});
+    const bool foot = !(std::fabs(beside) > 0);  // of the perpendicular, on the edge: nothing is nearer
+    if (!foot && !(out * out + beside * beside < square)) continue;
+    square = out * out + beside * beside;
+    nx = -ey * side;
+    ny = ex * side;
+    to_x = point[0] - out * nx - beside * ex;
+    to_y = point[1] - out * ny - beside * ey;
+    if (foot) break;
+  }
+  if (!(square < kFree)) return true;
+  point[0] = to_x;
+  point[1] = to_y;
+  for (std::size_t i = 0; i < rotors_; ++i) {
+    const Real across = gx[i] * nx + gy[i] * ny;
+    if (!(std::fabs(across) > kFlat)) continue;
+    const Real limit = across > 0 ? high_[i] : low_[i];
+    move(i, limit - values_[i]);
+    values_[i] = limit;
+    fix(i);
+  }
+  return std::fabs(nx) <= std::fabs(ny);
+}
+
+void WithinLimits::reach_roll_pitch(Real roll, Real pitch) noexcept {
+  Real point[2] = {roll / reach_, pitch / reach_};
+  // On an edge first that of the two which changes along it.
+  const std::size_t first = cut_to_polygon(point) ? 0 : 1;
+  approach(kMostRotors + first, {point[first], point[first]});
+  approach(kMostRotors + 1 - first, {point[1 - first], point[1 - first]});
+  for (std::size_t i = 0; i < rotors_; ++i) {
+    limits_.low[i] = low_[i];
+    limits_.high[i] = high_[i];
+  }
+  forget_fixed();
+}
+
+void WithinLimits::forget_fixed() noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < rows_count_; ++i) {
+    if (rows_[i] == index(Goal::roll) || rows_[i] == index(Goal::pitch)) continue;
+    for (std::size_t j = 0; j < columns_count_; ++j) entries_[count][j] = entries_[i][j];
+    rows_[count++] = rows_[i];
+  }
+  rows_count_ = count;
+  count = 0;
+  for (std::size_t j = 0; j < columns_count_; ++j) {
+    if (fixed(columns_[j])) continue;
+    for (std::size_t i = 0; i < rows_count_; ++i) entries_[i][count] = entries_[i][j];
+    columns_[count++] = columns_[j];
+  }
+  columns_count_ = count;
+}
+
+void WithinLimits::set_yaw(const Row& arms, Real now) noexcept {
+  constexpr std::size_t yaw = index(Goal::yaw), thrust = index(Goal::thrust);
+  const bool first = !(yaw_scale_ > 0);
+  for (std::size_t i = 0; i < rotors_; ++i) {
+    low_[i] = limits_.low[i];
+    high_[i] = limits_.high[i];
+    if (first) yaw_scale_ = std::max(yaw_scale_, std::fabs(arms[i]));
+  }
+  low_[thrust] = low_[yaw] = -kFree;
+  high_[thrust] = high_[yaw] = kFree;
+  if (first) rows_[rows_count_++] = static_cast<std::uint8_t>(yaw);
+  const std::size_t row = row_of(yaw);
+  if (row == kGoals) return;
+  const Real unit = 1 / yaw_scale_;
+  Real scaled[kMostRotors];
+  for (std::size_t i = 0; i < rotors_; ++i) scaled[i] = arms[i] * unit;
+  for (std::size_t j = 0; j < columns_count_; ++j) {
+    Real entry = columns_[j] < kMostRotors ? scaled[columns_[j]] : Real(0);
+    for (std::size_t i = 0; i < rows_count_; ++i) {
+      if (i != row && rows_[i] < kMostRotors) entry += scaled[rows_[i]] * entries_[i][j];
+    }
+    entries_[row][j] = entry;
+  }
+  values_[yaw] = now * unit;
+}
+
+bool WithinLimits::correct_yaw(Real off) noexcept {
+  constexpr std::size_t yaw = index(Goal::yaw);
+  for (std::size_t j = 0; j < columns_count_; ++j) {
+    if (columns_[j] != yaw || !(std::fabs(off) > nothing_ * yaw_scale_)) continue;
+    Real by = off / yaw_scale_;
+    (void)blocking(j, by, kGoals, false);
+    const Real told = values_[yaw];
+    move(j, by);
+    values_[yaw] = told;
     return true;
-  };
-  for (std::size_t k = 0; k < kept_count_; ++k) take(kept_[k]);
-  if (bounded_counts_ && at_bound_ != 0) basis.ends_with_bounded = take(bounded_);
-  return basis;
+  }
+  return false;
 }
 
-Real WithinLimits::missing(const Row& row, Range wanted) const noexcept {
-  const Real now = dot(row, thrusts_);
-  return std::min(std::max(now, wanted.low), wanted.high) - now;
+void WithinLimits::reach(Goal goal, Range wanted) noexcept {
+  const Real unit = goal == Goal::yaw ? 1 / yaw_scale_ : Real(1);
+  approach(index(goal), {wanted.low * unit, wanted.high * unit});
 }
 
-void WithinLimits::go(const Row& way, Real share) noexcept {
-  std::size_t first = way.size();
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    if (!free_[i] || !(std::fabs(way[i]) > 0)) continue;
-    const Real room = ((way[i] > 0 ? high_[i] : low_[i]) - thrusts_[i]) / way[i];
-    if (room < share) {
-      share = std::max(room, Real(0));
-      first = i;
+void WithinLimits::approach(std::size_t goal, Range wanted) noexcept {
+  const std::size_t row = row_of(goal);
+  if (row == kGoals) return;
+  low_[goal] = -kFree;
+  high_[goal] = kFree;
+  int on_the_spot = 0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Real need = nearest(values_[goal], wanted) - values_[goal];
+    if (!(std::fabs(need) > nothing_)) {
+      if (!(wanted.low < wanted.high)) {
+        fix(goal);
+        (void)exchange(row);
+        return;
+      }
+      low_[goal] = wanted.low;
+      high_[goal] = wanted.high;
+      return;
+    }
+    const bool careful = on_the_spot >= kPatience;
+    const std::size_t column = entering(row, need, careful);
+    if (column == columns_count_) {  // No nearer; what would take it away stays.
+      for (std::size_t j = 0; j < columns_count_; ++j) {
+        if (std::fabs(entries_[row][j]) > kFlat) fix(columns_[j]);
+      }
+      return;
+    }
+    ++steps_;
+    const std::size_t variable = columns_[column];
+    const Real whole = need / entries_[row][column];
+    const Real own = room(variable, whole > 0), most = std::min(own, std::fabs(whole));
+    Real by = whole > 0 ? most : -most;
+    const std::size_t first = blocking(column, by, row, careful);
+    on_the_spot = std::fabs(by) > nothing_ ? 0 : on_the_spot + 1;
+    move(column, by);
+    if (first < kGoals) {
+      const std::size_t met = rows_[first];
+      values_[met] = entries_[first][column] * whole > 0 ? high_[met] : low_[met];
+      pivot(first, column);
+    } else if (own < std::fabs(whole)) {
+      values_[variable] = whole > 0 ? high_[variable] : low_[variable];
+    } else {
+      values_[goal] = need > 0 ? wanted.low : wanted.high;
+      low_[goal] = wanted.low;
+      high_[goal] = wanted.high;
+      return pivot(row, column);
     }
   }
-  if (bounded_counts_ && at_bound_ == 0) {
-    const Real slope = free_dot(bounded_, way), now = dot(bounded_, thrusts_);
-    const Real room = std::fabs(slope) > 0 ? ((slope > 0 ? bounds_.high : bounds_.low) - now) / slope
-                                           : std::numeric_limits<Real>::infinity();
-    if (room < share) {
-      share = std::max(room, Real(0));
-      first = way.size();
-      at_bound_ = slope > 0 ? 1 : -1;
-    }
-  }
-  for (std::size_t i = 0; i < way.size(); ++i) {
-    if (free_[i]) thrusts_[i] = std::min(std::max(thrusts_[i] + share * way[i], low_[i]), high_[i]);
-  }
-  if (first == way.size()) return;
-  thrusts_[first] = way[first] > 0 ? high_[first] : low_[first];
-  free_[first] = false;
+  cut_short_ = true;
+  fix(goal);
 }
 
-bool WithinLimits::let_go(const Row& gain, const Row& wish, const Basis& basis, Real least) noexcept {
-  std::size_t best = gain.size();
-  Real most = least;
-  for (std::size_t i = 0; i < gain.size(); ++i) {
-    if (free_[i] || !(low_[i] < high_[i])) continue;
-    const Real inwards = thrusts_[i] > low_[i] ? -gain[i] : gain[i];
-    if (inwards > most) {
-      most = inwards;
-      best = i;
+std::size_t WithinLimits::entering(std::size_t row, Real need, bool careful) const noexcept {
+  std::size_t best = columns_count_, first = kVariables;
+  Real most = kFlat;
+  const Real sign = need > 0 ? Real(1) : Real(-1);
+  for (std::size_t j = 0; j < columns_count_; ++j) {
+    const Real entry = entries_[row][j] * sign;
+    if (!(std::fabs(entry) > most)) continue;
+    const std::size_t variable = columns_[j];
+    if (!(room(variable, entry > 0) > nothing_) || (careful && variable > first)) continue;
+    best = j;
+    if (careful) {
+      first = variable;
+    } else {
+      most = std::fabs(entry);
     }
   }
-  if (best < gain.size()) {
-    free_[best] = true;
-    return true;
+  return best;
+}
+
+Real WithinLimits::distance(std::size_t variable, Real change) const noexcept {
+  const Real size = std::fabs(change);
+  return size > kZero ? std::max(room(variable, change > 0), Real(0)) / size : kFree;
+}
+
+std::size_t WithinLimits::blocking(std::size_t column, Real& by, std::size_t but, bool careful) const noexcept {
+  const Real sign = by > 0 ? Real(1) : Real(-1);
+  std::size_t first = kGoals;
+  Real most = by * sign, steepest = 0, tie = 0;
+  for (std::size_t i = 0; i < rows_count_; ++i) {
+    const Real entry = entries_[i][column] * sign, share = distance(rows_[i], entry), size = std::fabs(entry);
+    // Of those that meet their limits together the one that bends the rest the least.
+    const bool better = first < kGoals && (careful ? rows_[i] < rows_[first] : size > steepest);
+    if (i == but || !(share < most - tie || (better && share <= most + tie))) continue;
+    most = std::min(most, share);
+    steepest = size;
+    tie = nothing_;
+    first = i;
   }
-  if (!basis.ends_with_bounded || !(bounds_.low < bounds_.high)) return false;
-  const Real inwards = -static_cast<Real>(at_bound_) * free_dot(wish, basis.rows[basis.size - 1]);
-  if (!(inwards > least)) return false;
-  at_bound_ = 0;
+  by = most * sign;
+  return first;
+}
+
+void WithinLimits::move(std::size_t column, Real by) noexcept {
+  values_[columns_[column]] += by;
+  for (std::size_t i = 0; i < rows_count_; ++i) values_[rows_[i]] += entries_[i][column] * by;
+}
+
+void WithinLimits::pivot(std::size_t row, std::size_t column) noexcept {
+  const Real inverse = 1 / entries_[row][column];
+  for (std::size_t j = 0; j < columns_count_; ++j) entries_[row][j] *= -inverse;
+  entries_[row][column] = inverse;
+  for (std::size_t i = 0; i < rows_count_; ++i) {
+    if (i == row) continue;
+    const Real share = entries_[i][column];
+    entries_[i][column] = 0;
+    for (std::size_t j = 0; j < columns_count_; ++j) entries_[i][j] += share * entries_[row][j];
+  }
+  std::swap(rows_[row], columns_[column]);
+}
+
+std::size_t WithinLimits::row_of(std::size_t goal) noexcept {
+  for (std::size_t i = 0; i < rows_count_; ++i) {
+    if (rows_[i] == goal) return i;
+  }
+  if (fixed(goal)) return kGoals;
+  std::size_t column = 0, best = kGoals;
+  while (columns_[column] != goal) ++column;
+  Real most = kFlat;
+  for (std::size_t i = 0; i < rows_count_; ++i) {
+    const Real size = std::fabs(entries_[i][column]);
+    if (rows_[i] >= kMostRotors || !(size > most)) continue;
+    most = size;
+    best = i;
+  }
+  if (best < kGoals) pivot(best, column);
+  return best;
+}
+
+bool WithinLimits::exchange(std::size_t row) noexcept {
+  std::size_t best = columns_count_;
+  Real most = kFlat;
+  for (std::size_t j = 0; j < columns_count_; ++j) {
+    const std::size_t variable = columns_[j];
+    if (fixed(variable)) continue;
+    const bool between = room(variable, true) > nothing_ && room(variable, false) > nothing_;
+    const Real worth = std::fabs(entries_[row][j]) * (between ? 1 : Real(0.1));
+    if (!(worth > most)) continue;
+    most = worth;
+    best = j;
+  }
+  if (best == columns_count_) return false;
+  pivot(row, best);
   return true;
 }
 
-void WithinLimits::go_towards(const Row& a, const Row& b, Range wanted_a, Real wanted_b) noexcept {
-  const Real size = dot(a, a) + dot(b, b), rounding = kRounding * (size_of(a, high_) + size_of(b, high_));
-  for (int step = 0; step < most_steps(a.size()); ++step) {
-    const Real left_a = missing(a, wanted_a), left_b = missing(b, {wanted_b, wanted_b});
-    const Real left = std::sqrt(left_a * left_a + left_b * left_b);
-    if (!(left > rounding)) return;
+void WithinLimits::ease() noexcept {
+  // Conjugate gradients over the columns that may move, anew from each limit that is met.
+  const Real eased = nothing_ * (kEased / kRounding);
+  Real way[kMostRotors] = {}, before = 0;
+  for (int step = 0; step < kEasings; ++step) {
+    Real slopes[kMostRotors], square = 0;
+    for (std::size_t j = 0; j < columns_count_; ++j) {
+      const std::size_t variable = columns_[j];
+      slopes[j] = 0;
+      if (variable >= kMostRotors || fixed(variable)) continue;
+      Real slope = values_[variable];
+      for (std::size_t i = 0; i < rows_count_; ++i) {
+        if (rows_[i] < kMostRotors) slope += entries_[i][j] * values_[rows_[i]];
+      }
+      if (!(room(variable, slope < 0) > nothing_)) continue;
+      slopes[j] = slope;
+      square += slope * slope;
+    }
+    if (!(square > eased * eased)) return;
     ++steps_;
-    const Basis held = basis();
-    Row wish(a.size());
-    add(wish, left_a / left, a);
-    add(wish, left_b / left, b);
-    const Row down = reduced(wish, held);
-    const Real slope = free_dot(down, down);
-    if (!(slope > kNothing * size)) {
-      if (!let_go(down, wish, held, kRounding * std::sqrt(size))) return;
-      continue;
+    const Real share = before > 0 ? square / before : Real(0);
+    // Down the way to its lowest point, or to the first limit.
+    Real down = 0, bend = 0, rows_way[kGoals] = {};
+    for (std::size_t j = 0; j < columns_count_; ++j) {
+      const Real here = way[j] = share * way[j] - slopes[j];
+      if (!(std::fabs(here) > 0)) continue;
+      down -= slopes[j] * here;
+      bend += here * here;
+      for (std::size_t i = 0; i < rows_count_; ++i) rows_way[i] += entries_[i][j] * here;
     }
-    // The best point of all that is free: two unknowns, along what a and b leave.
-    Row first = reduced(a, held), second = reduced(b, held);
-    Real left_first = left_a, left_second = left_b;
-    if (free_dot(first, first) < free_dot(second, second)) {
-      std::swap(first, second);
-      std::swap(left_first, left_second);
+    for (std::size_t i = 0; i < rows_count_; ++i) {
+      if (rows_[i] < kMostRotors) bend += rows_way[i] * rows_way[i];
     }
-    const Real square = free_dot(first, first), along = free_dot(first, second) / square;
-    add(second, -along, first);
-    add(second, -free_dot(first, second) / square, first);
-    const Real across = free_dot(second, second);
-    Row way(a.size());
-    if (across > kNothing * square) {
-      add(way, left_first / square, first);
-      add(way, (left_second - along * left_first) / across, second);
-    } else {  // a and b leave one direction: down it to the lowest point
-      const Real gain_a = free_dot(a, down), gain_b = free_dot(b, down);
-      add(way, left * slope / (gain_a * gain_a + gain_b * gain_b), down);
+    const Real whole = down / bend;
+    Real by = whole;
+    std::size_t row = kGoals;
+    for (std::size_t j = 0; j < columns_count_; ++j) by = std::min(by, distance(columns_[j], way[j]));
+    for (std::size_t i = 0; i < rows_count_; ++i) {
+      const Real most = distance(rows_[i], rows_way[i]);
+      if (!(most < by)) continue;
+      by = most;
+      row = i;
     }
-    go(reduced(way, held), 1);
+    for (std::size_t j = 0; j < columns_count_; ++j) values_[columns_[j]] += by * way[j];
+    for (std::size_t i = 0; i < rows_count_; ++i) values_[rows_[i]] += by * rows_way[i];
+    before = by < whole ? Real(0) : square;
+    if (row == kGoals) continue;
+    const std::size_t met = rows_[row];
+    values_[met] = rows_way[row] > 0 ? high_[met] : low_[met];
+    if (!exchange(row)) return;
   }
+  cut_short_ = true;
 }
 
-void WithinLimits::reach(const Row& row, Range wanted, Keep keep) noexcept {
-  bounded_counts_ = bounded_counts_ && keep != Keep::within;
-  go_towards(row, Row(row.size()), wanted, 0);
-  if (keep == Keep::as_it_is) {
-    kept_[kept_count_++] = row;
-    return;
-  }
-  const Real now = dot(row, thrusts_), rounding = kRounding * size_of(row, high_);
-  bounded_ = row;
-  bounded_counts_ = true;
-  bounds_ = std::fabs(missing(row, wanted)) > rounding ? Range{now, now} : wanted;
-  at_bound_ = now >= bounds_.high - rounding ? 1 : now <= bounds_.low + rounding ? -1 : 0;
-}
-
-void WithinLimits::reach(const Row& a, const Row& b, Real wanted_a, Real wanted_b) noexcept {
-  go_towards(a, b, {wanted_a, wanted_a}, wanted_b);
-  kept_[kept_count_++] = a;
-  kept_[kept_count_++] = b;
+void WithinLimits::thrusts(Row& result) const noexcept {
+  for (std::size_t i = 0; i < rotors_; ++i) result[i] = nearest(values_[i], {limits_.low[i], limits_.high[i]});
 }
 
 }  // namespace kphi::compensation

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 namespace kphi::compensation {
@@ -18,7 +19,7 @@ class Rotors {
   /// Of a vehicle with `count` rotors; more than kMostRotors count as that many.
   constexpr explicit Rotors(std::size_t count, const T& each = T()) noexcept
       : values_(padded(std::array<T, 1>{{each}}, std::make_index_sequence<kMostRotors>())),
-        count_(count < kMostRotors ? count : kMostRotors) {}
+        count_(static_cast<std::uint32_t>(count < kMostRotors ? count : kMostRotors)) {}
   template <std::size_t N>
   constexpr Rotors(const std::array<T, N>& values) noexcept  // NOLINT: the way in
       : values_(padded(values, std::make_index_sequence<kMostRotors>())), count_(N) {
@@ -29,6 +30,10 @@ class Rotors {
       : Rotors(std::array<T, 3 + sizeof...(More)>{{a, b, c, T(more)...}}) {}
 
   [[nodiscard]] constexpr std::size_t size() const noexcept { return count_; }
+  /// Of so many rotors, kMostRotors at most, the first of them as they are.
+  constexpr void resize(std::size_t count) noexcept { count_ = static_cast<std::uint32_t>(count); }
+  /// One rotor more; there must be less than kMostRotors.
+  constexpr void add(const T& value) noexcept { values_[count_++] = value; }
   [[nodiscard]] constexpr T& operator[](std::size_t i) noexcept { return values_[i]; }
   [[nodiscard]] constexpr const T& operator[](std::size_t i) const noexcept { return values_[i]; }
   [[nodiscard]] constexpr T* begin() noexcept { return values_.data(); }
@@ -52,7 +57,7 @@ class Rotors {
   }
 
   std::array<T, kMostRotors> values_{};
-  std::size_t count_ = 0;
+  std::uint32_t count_ = 0;
 };
 
 }  // namespace kphi::compensation

@@ -15,8 +15,10 @@ struct ThrottleCurve {
 
   /// u, held within [0, 1]; 0 where the thrust is NaN.
   [[nodiscard]] Real throttle_for(Newtons thrust) const noexcept {
-    const Real share = thrust / full, straight = 1 - square_share;
-    if (!(share > 0)) return 0;
+    const Real asked = thrust.value();
+    if (is_nan(asked)) return 0;
+    const Real share = asked / full.value(), straight = 1 - square_share;
+    if (share <= 0) return 0;
     if (share >= 1) return 1;
     // The root in the form that stays good for a straight line.
     return 2 * share / (straight + std::sqrt(straight * straight + 4 * square_share * share));

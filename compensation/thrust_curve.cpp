@@ -2,18 +2,39 @@
 
 #include <limits>
 
+#include "compensation/strict_math.hpp"
+
 namespace kphi::compensation {
 namespace {
 
 constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
 
-bool positive(Real value) noexcept { return std::isfinite(value) && value > 0; }
+bool positive(Real value) noexcept { return is_finite(value) && value > 0; }
 
-bool not_negative(Real value) noexcept { return std::isfinite(value) && value >= 0; }
+bool not_negative(Real value) noexcept { return is_finite(value) && value >= 0; }
 
-bool sound(const LineUncertainty& u) noexcept {
-  return not_negative(u.thrust_coefficient) && not_negative(u.intercept_variance) && std::isfinite(u.covariance) &&
-         not_negative(u.slope_variance);
+/// Positive, and not rising.
+bool may_be_k(const KnotList& knots) noexcept {
+  Real least = knots[0].value;
+  for (std::size_t i = 0; i < knots.count; ++i) {
+    const Real value = knots[i].value;
+    if (!(value > 0 && value <= least)) return false;
+    least = value;
+  }
+  return true;
+}
+
+bool may_be_torque(const KnotList& knots) noexcept {
+  for (std::size_t i = 0; i < knots.count; ++i) {
+    const Real value = knots[i].value;
+    if (!(value > 0 && value < kMostTorque)) return false;
+  }
+  return true;
+}
+
+bool sound(const SpeedTrend& trend) noexcept {
+  return positive(trend.reference.value()) && is_finite(trend.per_rad_s) &&
+         std::fabs(trend.per_rad_s * trend.reference.value()) <= SpeedTrend::kMost;
 }
 
 Real variance_at(const LineUncertainty& u, Real phi) noexcept {
@@ -22,41 +43,60 @@ Real variance_at(const LineUncertainty& u, Real phi) noexcept {
 
 }  // namespace
 
+bool sound(const LineUncertainty& u) noexcept {
+  return not_negative(u.thrust_coefficient) && not_negative(u.intercept_variance) && is_finite(u.covariance) &&
+         not_negative(u.slope_variance);
+}
+
+Real scaling_factor_of(Real k, Real thrust_coefficient, Radians occlusion_angle, ScalingLaw law) noexcept {
+  if (law == ScalingLaw::published) return 1 - std::fabs(thrust_coefficient - k) / thrust_coefficient;
+  if (is_nan(occlusion_angle.value()) || occlusion_angle.value() <= 0) return 1;
+  return std::min(Real(1), std::max(kScalingFloor, k / thrust_coefficient));
+}
+
+bool sound(const CurveParts& parts) noexcept {
+  if (!positive(parts.largest_fitted.value()) || parts.largest_fitted.value() > 2 * kPi) return false;
+  if (parts.overlap > OverlapMeasure::load_share || !positive(parts.thrust_coefficient.value())) return false;
+  if (parts.k.count == 0) {
+    if (!positive(parts.intercept.value()) || !is_finite(parts.slope_per_rad)) return false;
+  } else if (!sound(parts.k) || !may_be_k(parts.k)) {
+    return false;
+  }
+  if (parts.torque.count != 0 && (!sound(parts.torque) || !may_be_torque(parts.torque))) return false;
+  const bool trend = is_nan(parts.speed_trend.per_rad_s) || std::fabs(parts.speed_trend.per_rad_s) > 0;
+  return !trend || sound(parts.speed_trend);
+}
+
+CurveParts ThrustCurve::parts() const noexcept {
+  return {thrust_coefficient_, line_.intercept,      line_.slope_per_rad, largest_fitted_, overlap_,
+          table_.list(),       torque_share_.list(), speed_trend_};
+}
+
 std::optional<ThrustCurve> ThrustCurve::from_line(ThrustCoefficient thrust_coefficient, ThrustCoefficient intercept,
                                                   Real slope_per_rad, Radians largest_fitted, OverlapMeasure overlap,
                                                   const std::optional<LineUncertainty>& uncertainty) noexcept {
-  if (!positive(thrust_coefficient.value()) || !positive(intercept.value())) return std::nullopt;
-  if (!std::isfinite(slope_per_rad)) return std::nullopt;
-  if (!positive(largest_fitted.value()) || largest_fitted.value() > 2 * kPi) return std::nullopt;
-  if (overlap > OverlapMeasure::load_share || (uncertainty && !sound(*uncertainty))) return std::nullopt;
-  return ThrustCurve(thrust_coefficient, {intercept, slope_per_rad, uncertainty}, largest_fitted, overlap);
+  const ThrustCurve curve(thrust_coefficient, {intercept, slope_per_rad, uncertainty}, largest_fitted, overlap);
+  if ((uncertainty && !sound(*uncertainty)) || !sound(curve.parts())) return std::nullopt;
+  return curve;
 }
 
 std::optional<ThrustCurve> ThrustCurve::from_table(const OcclusionTable& k, Radians largest_fitted,
                                                    OverlapMeasure overlap) noexcept {
   if (k.empty()) return std::nullopt;
-  Real least = k.begin()->value;
-  for (const Knot& knot : k) {
-    if (!(knot.value > 0 && knot.value <= least)) return std::nullopt;
-    least = knot.value;
-  }
   const ThrustCoefficient first(k.begin()->value);
-  auto curve = from_line(first, first, 0, largest_fitted, overlap);
-  if (curve) curve->table_ = k;
-  return curve;
+  ThrustCurve curve(first, {first, 0, std::nullopt}, largest_fitted, overlap);
+  curve.table_ = k;
+  return sound(curve.parts()) ? std::optional<ThrustCurve>(curve) : std::nullopt;
 }
 
 bool ThrustCurve::set_speed_trend(const SpeedTrend& trend) noexcept {
-  if (!positive(trend.reference.value())) return false;
-  if (!(std::fabs(trend.per_rad_s * trend.reference.value()) <= SpeedTrend::kMost)) return false;
+  if (!sound(trend)) return false;
   speed_trend_ = trend;
   return true;
 }
 
 bool ThrustCurve::set_torque_share(const OcclusionTable& share) noexcept {
-  for (const Knot& knot : share) {
-    if (!(knot.value > 0 && knot.value < kMostTorque)) return false;
-  }
+  if (!may_be_torque(share.list())) return false;
   torque_share_ = share;
   return true;
 }
@@ -66,8 +106,8 @@ std::optional<ThrustCurve> ThrustCurve::perturbed(ThrustCoefficient raised, Real
   result.line_.intercept = line_.intercept + raised;
   result.line_.slope_per_rad = line_.slope_per_rad * steepness;
   if (!table_.empty()) result.table_ = table_.moved(table_.begin()->value + raised.value(), steepness);
-  return positive(result.at(Radians(0)).value()) && std::isfinite(steepness) ? std::optional<ThrustCurve>(result)
-                                                                             : std::nullopt;
+  return positive(result.at(Radians(0)).value()) && is_finite(steepness) ? std::optional<ThrustCurve>(result)
+                                                                         : std::nullopt;
 }
 
 Real SpeedTrend::speed_for(Real plain) const noexcept {
@@ -86,7 +126,7 @@ Real SpeedTrend::speed_for(Real plain) const noexcept {
 bool ThrustCurve::has_uncertainty() const noexcept {
   if (table_.empty()) return line_.uncertainty.has_value();
   for (const Knot& knot : table_) {
-    if (!std::isfinite(knot.standard_error)) return false;
+    if (!is_finite(knot.standard_error)) return false;
   }
   return true;
 }
@@ -101,7 +141,7 @@ Real ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_un
                                        ScalingLaw law) const noexcept {
   const Real phi = occlusion_angle.value(), reference = thrust_coefficient_.value(), k = at(occlusion_angle).value();
   const Real factor = scaling_factor(occlusion_angle, law);
-  if (!has_uncertainty() || std::isnan(phi) || !(factor > kScalingFloor)) return kUnknown;
+  if (!has_uncertainty() || is_nan(phi) || !(factor > kScalingFloor)) return kUnknown;
   const bool line = table_.empty();
   const Real of_thrust_coefficient = line ? line_.uncertainty->thrust_coefficient : table_.begin()->standard_error;
   if (law == ScalingLaw::clamped && !(factor < 1)) return of_thrust_coefficient / reference;
@@ -111,7 +151,7 @@ Real ThrustCurve::relative_uncertainty(Radians occlusion_angle, Radians angle_un
   // The published law reflects the curve at K_T: K_T k_i = 2 K_T − k there.
   if (k > reference) variance += 4 * of_thrust_coefficient * of_thrust_coefficient;
   const Real relative = std::sqrt(std::max(variance, Real(0))) / (reference * factor);
-  return std::isnan(relative) ? kUnknown : relative;
+  return is_nan(relative) ? kUnknown : relative;
 }
 
 }  // namespace kphi::compensation

@@ -34,6 +34,9 @@ struct LineUncertainty {
   Real slope_variance = 0;      ///< per rad²
 };
 
+/// Whether variances are finite and not negative.
+[[nodiscard]] bool sound(const LineUncertainty& uncertainty) noexcept;
+
 /// k(φ) = intercept + slope φ.
 struct Line {
   ThrustCoefficient intercept;  ///< k at φ = 0 [N/(rad/s)²], positive; K_T only if the fit was anchored
@@ -55,6 +58,30 @@ struct SpeedTrend {
   /// by a fifth up to there; in double.
   [[nodiscard]] Real speed_for(Real plain) const noexcept;
 };
+
+/// What a curve is made of, wherever its knots are: for what takes it over without a copy.
+struct CurveParts {
+  ThrustCoefficient thrust_coefficient;  ///< K_T
+  ThrustCoefficient intercept;           ///< of the line; does not count where `k` has knots
+  Real slope_per_rad = 0;
+  Radians largest_fitted;
+  OverlapMeasure overlap = OverlapMeasure::rim_arc;
+  KnotList k{};       ///< without any: the line
+  KnotList torque{};  ///< without any: 1 everywhere
+  SpeedTrend speed_trend{};
+};
+
+/// Whether a ThrustCurve can be made of it.
+[[nodiscard]] bool sound(const CurveParts& parts) noexcept;
+
+/// k_i of this k. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula
+/// gives.
+[[nodiscard]] Real scaling_factor_of(Real k, Real thrust_coefficient, Radians occlusion_angle, ScalingLaw law) noexcept;
+
+/// Within [1/kMostTorque, kMostTorque].
+[[nodiscard]] inline Real held_torque_share(Real share) noexcept {
+  return std::min(kMostTorque, std::max(1 / kMostTorque, share));
+}
 
 /// T = k(φ) ω². A ThrustCurve that exists is valid.
 class ThrustCurve {
@@ -81,8 +108,7 @@ class ThrustCurve {
   /// unless each is in (0, kMostTorque). Without it the torque is taken not to depend on φ.
   bool set_torque_share(const OcclusionTable& share) noexcept;
   [[nodiscard]] Real torque_share_at(Radians occlusion_angle) const noexcept {
-    return torque_share_.empty() ? Real(1)
-                                 : std::min(kMostTorque, std::max(1 / kMostTorque, torque_share_.at(occlusion_angle)));
+    return torque_share_.empty() ? Real(1) : held_torque_share(torque_share_.at(occlusion_angle));
   }
 
   /// K_T [N/(rad/s)²], positive.
@@ -98,6 +124,8 @@ class ThrustCurve {
   decltype(auto) visit(OfLine&& of_line, OfTable&& of_table) const {
     return table_.empty() ? of_line(line_) : of_table(table_);
   }
+  /// As long as the curve lives.
+  [[nodiscard]] CurveParts parts() const noexcept;
   [[nodiscard]] bool has_uncertainty() const noexcept;
 
   /// k(φ), also beyond the largest fitted angle, where it may be negative.
@@ -111,13 +139,9 @@ class ThrustCurve {
   [[nodiscard]] Real bend_error_at(Radians occlusion_angle) const noexcept {
     return table_.empty() ? Real(0) : table_.bend_error_at(occlusion_angle);
   }
-  /// k_i. `clamped` is in [kScalingFloor, 1] whatever φ is, 1 if φ is NaN; `published` is what the formula gives.
+  /// As scaling_factor_of(), with k(φ).
   [[nodiscard]] Real scaling_factor(Radians occlusion_angle, ScalingLaw law = ScalingLaw::clamped) const noexcept {
-    const Real reference = thrust_coefficient_.value();
-    const Real k = at(occlusion_angle).value();
-    if (law == ScalingLaw::published) return 1 - std::fabs(reference - k) / reference;
-    if (!(occlusion_angle.value() > 0)) return 1;
-    return std::min(Real(1), std::max(kScalingFloor, k / reference));
+    return scaling_factor_of(at(occlusion_angle).value(), thrust_coefficient_.value(), occlusion_angle, law);
   }
   /// Standard uncertainty of K_T k_i relative to itself, from K_T, the curve and the angle's own `angle_uncertainty`;
   /// the speed ω = sqrt(T/(K_T k_i)) has half of it. Where k_i is held at 1 it is K_T's alone. K_T and the curve count

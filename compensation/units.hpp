@@ -2,6 +2,9 @@
 // gram-force and N/RPM² exist only as named ways in and out. No conversion happens by itself.
 #pragma once
 
+#include <cstdint>
+#include <cstring>
+
 namespace kphi {
 
 /// What the library that flies computes with: double, or float where the processor knows no more (KPHI_FLOAT, which the
@@ -12,7 +15,35 @@ using Real = float;
 using Real = double;
 #endif
 
+/// By its bits: a compiler with -ffast-math takes it that there is no NaN, and leaves out what compares for it.
+[[nodiscard]] inline bool is_nan(const float& value) noexcept {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return (bits & 0x7FFFFFFFu) > 0x7F800000u;
+}
+[[nodiscard]] inline bool is_nan(const double& value) noexcept {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return (bits & 0x7FFFFFFFFFFFFFFFu) > 0x7FF0000000000000u;
+}
+/// Neither NaN nor infinite, by its bits.
+[[nodiscard]] inline bool is_finite(const float& value) noexcept {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return (bits & 0x7F800000u) != 0x7F800000u;
+}
+[[nodiscard]] inline bool is_finite(const double& value) noexcept {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return (bits & 0x7FF0000000000000u) != 0x7FF0000000000000u;
+}
+
 inline constexpr Real kPi = Real(3.14159265358979323846);
+
+namespace literals {
+/// A number in Real: 0.045_si is no double where Real is float.
+[[nodiscard]] constexpr Real operator""_si(long double value) noexcept { return static_cast<Real>(value); }
+}  // namespace literals
 
 /// A number with a unit. `value()` is in the SI unit that the alias below names.
 template <class Unit, class Number = Real>

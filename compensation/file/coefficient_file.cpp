@@ -216,7 +216,8 @@ std::optional<ThrustCurve> read_line(const Value& top, ThrustCoefficient k_t, do
   const double slope = line.map_at("slope_per_deg").at("value").number() * scale * kPerDegreeToPerRad;
   const auto c = read_covariance(top, {scale, scale, scale * kPerDegreeToPerRad});
   std::optional<LineUncertainty> uncertainty;
-  if (!c.empty()) uncertainty = LineUncertainty{std::sqrt(c[0][0]), c[1][1], c[1][2], c[2][2]};
+  const auto real = [](double number) { return static_cast<Real>(number); };
+  if (!c.empty()) uncertainty = LineUncertainty{real(std::sqrt(c[0][0])), real(c[1][1]), real(c[1][2]), real(c[2][2])};
   if (!(intercept.value() > 0.0))
     line.at("intercept").refuse("the intercept must be positive", "check sign and unit of the fit");
   return ThrustCurve::from_line(k_t, intercept, slope, largest, overlap_of(top), uncertainty);
@@ -237,7 +238,7 @@ std::optional<ThrustCurve> read_table(const Value& top, ThrustCoefficient k_t, d
     if (!knots.empty() && k > least) row.at("value").refuse("k of the table rises with phi_deg", kFitAgain);
     least = k;
     const auto u = read_uncertainty(row, scale);
-    knots.push_back({at, k, u ? u->u : std::numeric_limits<double>::infinity()});
+    knots.push_back({at, static_cast<Real>(k), u ? static_cast<Real>(u->u) : std::numeric_limits<Real>::infinity()});
   }
   if (knots.size() < 2 || knots.size() > kMostKnots)
     block.refuse("a table needs 2 to " + std::to_string(kMostKnots) + " knots", kFitAgain);
@@ -348,12 +349,13 @@ void read_more_of_curve(const Value& top, const std::vector<Coefficients::Torque
   if (top.find("speed_trend")) {
     const Value trend = top.map_at("speed_trend");
     const double share = trend.at("share_per_1000_rpm").number() / from_rpm(1000).value();
-    if (!curve.set_speed_trend({share, from_rpm(trend.at("reference_rpm").number())}))
+    if (!curve.set_speed_trend({static_cast<Real>(share), from_rpm(trend.at("reference_rpm").number())}))
       trend.refuse("k changes by more than 0.3 from rest to the reference speed, or that is not positive", kFitAgain);
   }
   if (torque.size() < 2 || torque.size() > kMostKnots) return;
   std::vector<Knot> shares;
-  for (const Coefficients::Torque& one : torque) shares.push_back({one.occlusion, one.k_q / torque.front().k_q});
+  for (const Coefficients::Torque& one : torque)
+    shares.push_back({one.occlusion, static_cast<Real>(one.k_q / torque.front().k_q)});
   const auto table = OcclusionTable::from(shares.data(), shares.size());
   if (!table || !curve.set_torque_share(*table))
     top.at("torque").refuse("the torques do not ascend from phi_deg 0, or one is ten times the first", kFitAgain);

@@ -80,11 +80,15 @@ PolygonBody polygon_of(const Numbers& corners, const py::sequence& hinges) {
   return body;
 }
 
-Compensator build(const std::vector<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) {
+Rotors<ThrustCurve> curves_of(const std::vector<ThrustCurve>& curves) {
   if (curves.empty() || curves.size() > kMostRotors) refuse(describe(Refusal::rotors));
   Rotors<ThrustCurve> rotors(curves.size(), curves.front());
   for (std::size_t i = 0; i < curves.size(); ++i) rotors[i] = curves[i];
-  const BuildOutcome outcome = Compensator::build(rotors, airframe, law);
+  return rotors;
+}
+
+Compensator build(const std::vector<ThrustCurve>& curves, const Airframe& airframe, ScalingLaw law) {
+  const BuildOutcome outcome = Compensator::build(curves_of(curves), airframe, law);
   if (!outcome.compensator) refuse(describe(outcome.refusal));
   return *outcome.compensator;
 }
@@ -298,10 +302,11 @@ void add_compensator(py::module_& module) {
            })
       .def(
           "speed_uncertainties",
-          [](const Compensator& c, const Numbers& thrusts, double u) {
-            return numbers_of(c.speed_uncertainties(rotors_of<Newtons>(thrusts, "thrusts"), Radians(u)));
+          [](const Compensator& c, const std::vector<ThrustCurve>& curves, const Numbers& thrusts, double u) {
+            return numbers_of(
+                c.speed_uncertainties(curves_of(curves), rotors_of<Newtons>(thrusts, "thrusts"), Radians(u)));
           },
-          py::arg("thrusts"), py::arg("arm_angle_uncertainty") = 0.0)
+          py::arg("curves"), py::arg("thrusts"), py::arg("arm_angle_uncertainty") = 0.0)
       .def("enable", &Compensator::enable, py::arg("on"))
       .def_property_readonly("enabled", &Compensator::enabled)
       .def("set_air_density_ratio", &Compensator::set_air_density_ratio, py::arg("ratio"))

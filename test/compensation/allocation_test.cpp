@@ -18,7 +18,8 @@ TEST(FlyingCalls, AllocateNothing) {
   }
   const ConvexPolygon square = ConvexPolygon::square(Metres(0.045));
   sum += occlusion_angle(square, Metres(0.0635), {Metres(0.07), Metres(0.05)}, OverlapMeasure::load_share).value();
-  sum += compensator.speed_uncertainties(thrusts_of(1, 1, 1, 1), Radians(0.01))[0].value();
+  sum += compensator.speed_uncertainties(Rotors<ThrustCurve>(4, paper_line()), thrusts_of(1, 1, 1, 1), Radians(0.01))[0]
+             .value();
   const RotorLayout layout = example_layout(shape_o());
   auto mixer = Mixer::build(layout, {Metres(0.0133), 1e-4});
   (void)mixer->set_layout(layout, compensator.drag_scale());

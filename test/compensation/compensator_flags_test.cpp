@@ -9,6 +9,8 @@
 namespace kphi::compensation {
 namespace compensator_flags_test {
 
+ThrustCurve certain_line() { return *paper_line_if(OverlapMeasure::rim_arc, LineUncertainty{1e-8, 1e-18, 0, 0}); }
+
 TEST(CompensatorFlags, DoesNotBelieveAnAngleOutsideTheArmsLimits) {
   Compensator compensator = with_arms(shape_o());
   const double phi = compensator.occlusion_angles()[0].value();
@@ -18,7 +20,8 @@ TEST(CompensatorFlags, DoesNotBelieveAnAngleOutsideTheArmsLimits) {
   EXPECT_FALSE(compensator.arm_flags()[1].any());
   EXPECT_EQ(compensator.occlusion_angles()[0].value(), phi) << "the last that was believed";
   EXPECT_TRUE(compensator.speeds_for(thrusts_of(1, 1, 1, 1)).flags[0].has(Flag::arm_angle_beyond));
-  EXPECT_TRUE(std::isinf(compensator.speed_uncertainties(thrusts_of(1, 1, 1, 1))[0].value()));
+  EXPECT_TRUE(std::isinf(
+      compensator.speed_uncertainties(Rotors<ThrustCurve>(4, certain_line()), thrusts_of(1, 1, 1, 1))[0].value()));
   compensator.set_arms(shape_o());
   EXPECT_FALSE(compensator.arm_flags()[0].any());
 
@@ -40,8 +43,12 @@ TEST(CompensatorFlags, SaysWhereAnArmHasMovedOnSinceItsAngleWasMeasured) {
   EXPECT_FALSE(stale(0.010, 3.0)) << "1.7 degrees";
   EXPECT_TRUE(stale(0.020, 3.0)) << "3.4 degrees";
   EXPECT_TRUE(stale(0.020, -3.0));
-  EXPECT_FALSE(stale(10, 0.0)) << "an arm at rest does not age";
+  EXPECT_FALSE(stale(0.49, 0.0)) << "an arm at rest";
   EXPECT_TRUE(stale(0.01, kNaN));
+  for (const double old : {0.51, kNaN, kInfinity}) {
+    compensator.set_arms(shape_o(), {Seconds(old), {}});
+    for (const Flags flags : compensator.arm_flags()) EXPECT_TRUE(flags.has(Flag::arm_angle_stale)) << old;
+  }
   compensator.set_arms(shape_o());
   EXPECT_FALSE(compensator.arm_flags()[1].has(Flag::arm_angle_stale));
 }

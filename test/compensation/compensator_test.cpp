@@ -373,32 +373,125 @@ TEST(CompensatorBuild, DoubtsALineThatStepsAtContactOrGainsWithOcclusion) {
   EXPECT_TRUE(doubts(example_line(1.0, 0), ScalingLaw::clamped).gains_with_occlusion);
 }
 
+class Hubs : public testing::TestWithParam<OverlapMeasure> {};
+
+TEST_P(Hubs, AreTheSameAsArmsThatHaveThemThere) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> angle(-kPi / 2, kPi);
+  Airframe square = example_airframe(GetParam()), polygon = square;
+  polygon.polygon = square_as_polygon(square.half_side);
+  const Masses masses{0.42, {}, {0.045, 0.05, 0.045, 0.04}};
+  const Rotors<int> spins{1, -1, 1, -1};
+  for (const Airframe& airframe : {square, polygon}) {
+    Compensator by_arms = compensator_of(airframe), by_hubs = by_arms;
+    for (int i = 0; i < 10'000; ++i) {
+      const Rotors<Radians> arms{Radians(angle(random)), Radians(angle(random)), Radians(angle(random)),
+                                 Radians(angle(random))};
+      Rotors<HubPosition> hubs(4);
+      for (std::size_t j = 0; j < 4; ++j) hubs[j] = hub_in_body(airframe, j, arms[j]);
+      by_arms.set_arms(arms);
+      by_hubs.set_hubs(hubs);
+      const RotorLayout a = by_arms.layout(masses, spins), b = by_hubs.layout(masses, spins);
+      for (std::size_t j = 0; j < 4; ++j) {
+        // The rim's arc is a root at tangency: there a place to 1e-17 m is an angle to 1e-8.
+        const bool touches = by_arms.occlusion_angles()[j].value() < 1e-3;
+        ASSERT_NEAR(by_hubs.occlusion_angles()[j].value(), by_arms.occlusion_angles()[j].value(),
+                    touches ? 1e-7 : 1e-12);
+        ASSERT_NEAR(b.hubs[j].x.value(), a.hubs[j].x.value(), 1e-15);
+        ASSERT_NEAR(b.hubs[j].y.value(), a.hubs[j].y.value(), 1e-15);
+      }
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(EachMeasure, Hubs,
+                         testing::Values(OverlapMeasure::rim_arc, OverlapMeasure::area_share,
+                                         OverlapMeasure::load_share));
+
+TEST(Hubs, OfATelescopingArmUncoverItsPropeller) {
+  Compensator compensator = example_compensator();
+  compensator.set_arms(shape_o());
+  const double folded = compensator.occlusion_angles()[0].value();
+  Rotors<HubPosition> hubs(4, at(0.3, 0.3));
+  hubs[0] = at(-0.072 - 0.02, 0.045);  // 2 cm longer than in O
+  compensator.set_hubs(hubs);
+  EXPECT_GT(compensator.occlusion_angles()[0].value(), 0.1);
+  EXPECT_LT(compensator.occlusion_angles()[0].value(), folded);
+  EXPECT_EQ(compensator.occlusion_angles()[1].value(), 0);
+
+  // What is no place keeps the last, with a flag; so does the one that resumes.
+  const double before = compensator.occlusion_angles()[0].value();
+  hubs[0] = {Metres(kNaN), Metres(0)};
+  hubs[1] = at(1e5, 0);
+  compensator.set_hubs(hubs, {Seconds(0.01), {0, 0, 1, 0}});
+  EXPECT_TRUE(compensator.arm_flags()[0].has(Flag::arm_angle_unknown));
+  EXPECT_TRUE(compensator.arm_flags()[1].has(Flag::arm_angle_beyond));
+  EXPECT_TRUE(compensator.arm_flags()[2].has(Flag::arm_angle_stale)) << "1 cm";
+  EXPECT_FALSE(compensator.arm_flags()[3].any());
+  EXPECT_EQ(compensator.occlusion_angles()[0].value(), before);
+  Compensator next = example_compensator();
+  next.resume_from(compensator);
+  EXPECT_EQ(next.occlusion_angles()[0].value(), before);
+  compensator.set_arms(shape_o());
+  EXPECT_EQ(compensator.occlusion_angles()[0].value(), folded) << "arms again";
+}
+
+TEST(Bodies, OfSeveralPartsCoverByTheirSum) {
+  const auto box = [](double x, double y, double half) {
+    const Position corners[] = {at(x + half, y + half), at(x - half, y + half), at(x - half, y - half),
+                                at(x + half, y - half)};
+    return *ConvexPolygon::from(corners, 4);
+  };
+  Airframe two = example_airframe(OverlapMeasure::area_share), left = two, right = two;
+  left.polygon = PolygonBody{box(-0.1, 0, 0.05), Rotors<Hinge>(4)};
+  right.polygon = PolygonBody{box(0.1, 0, 0.05), Rotors<Hinge>(4)};
+  two.polygon = left.polygon;
+  two.polygon->more[1] = box(0.1, 0, 0.05);
+  Compensator both = compensator_of(two), one = compensator_of(left), other = compensator_of(right);
+  const Rotors<HubPosition> hubs{at(0, 0), at(0.02, 0.01), at(-0.1, 0.08), at(0.3, 0)};
+  for (Compensator* each : {&both, &one, &other}) each->set_hubs(hubs);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_NEAR(both.occlusion_angles()[i].value(), (one.occlusion_angles()[i] + other.occlusion_angles()[i]).value(),
+                1e-14);
+  }
+  EXPECT_GT(one.occlusion_angles()[0].value(), 0.1);
+  EXPECT_GT(other.occlusion_angles()[0].value(), 0.1);
+  two.polygon->more[0] = box(-0.05, 0.04, 0.02);
+  EXPECT_EQ(build_with(paper_line(two.overlap), two).refusal, Refusal::body);
+  two.polygon->more[0] = box(-0.02, 0, 0.03);
+  EXPECT_EQ(build_with(paper_line(two.overlap), two).refusal, Refusal::none) << "they meet at an edge";
+
+  // Where a hinge stands free of the body an arm may be short.
+  two.arm_length = Metres(0.03);
+  EXPECT_EQ(build_with(paper_line(two.overlap), two).refusal, Refusal::none);
+}
+
 TEST(CompensatorUncertainty, TellsTheUncertaintyOfItsSpeeds) {
   const ThrustCurve rim = paper_line();
   const double k = kExampleCoefficient.value();
   const ThrustCurve line = *paper_line_if(OverlapMeasure::rim_arc, LineUncertainty{0.01 * k, 0.0004 * k * k, 0, 0});
-  Compensator compensator = *Compensator::build({line, line, line, rim}, example_airframe()).compensator;
+  const Rotors<ThrustCurve> curves{line, line, line, rim};
+  Compensator compensator = *Compensator::build(curves, example_airframe()).compensator;
   const auto thrusts = thrusts_of(1.5, 1.5, 1.5, 1.5);
   compensator.set_arms(arms_at(45, 180, 180, 180));
   const auto speeds = compensator.speeds_for(thrusts).speeds;
-  const auto exact_arms = compensator.speed_uncertainties(thrusts);
+  const auto exact_arms = compensator.speed_uncertainties(curves, thrusts);
   EXPECT_NEAR(exact_arms[0] / speeds[0], 0.005, 1e-12) << "half of K_T's";
   EXPECT_NEAR(exact_arms[1] / speeds[1], 0.5 * 0.02 / compensator.scaling_factors()[1], 1e-12) << "half of the line's";
   EXPECT_EQ(exact_arms[3].value(), kInfinity) << "the line carries none";
 
   // A degree of servo play moves φ by 1.5 to 1.84 degrees in O.
-  const auto loose_arms = compensator.speed_uncertainties(thrusts, from_degrees(1));
+  const auto loose_arms = compensator.speed_uncertainties(curves, thrusts, from_degrees(1));
   const double from_phi = std::sqrt(std::pow(loose_arms[1] / speeds[1], 2) - std::pow(exact_arms[1] / speeds[1], 2));
   EXPECT_NEAR(2 * from_phi * compensator.scaling_factors()[1] / 0.0028889, 1.7, 0.2);
   EXPECT_EQ(loose_arms[0], exact_arms[0]) << "far from contact the arm does not matter";
 
   compensator.enable(false);
-  const auto off = compensator.speed_uncertainties(thrusts, from_degrees(1));
+  const auto off = compensator.speed_uncertainties(curves, thrusts, from_degrees(1));
   EXPECT_NEAR(off[1] / compensator.speeds_for(thrusts).speeds[1], 0.005, 1e-12);
   compensator.enable(true);
   compensator.set_arms(arms_at(45, std::nan(""), 180, 180));
-  EXPECT_EQ(compensator.speed_uncertainties(thrusts)[1].value(), kInfinity) << "the arm is anywhere";
-  for (const RadPerSec none : compensator.speed_uncertainties(thrusts, Radians(kNaN))) {
+  EXPECT_EQ(compensator.speed_uncertainties(curves, thrusts)[1].value(), kInfinity) << "the arm is anywhere";
+  for (const RadPerSec none : compensator.speed_uncertainties(curves, thrusts, Radians(kNaN))) {
     EXPECT_EQ(none.value(), kInfinity);
   }
 }

@@ -28,4 +28,18 @@ struct Flown {
 /// Builds, sets the arms, mixes for hubs about a centre of gravity of four equal masses, and asks for the speeds.
 [[gnu::visibility("default")]] Flown flown_in_float(const Vehicle& vehicle);
 
+/// A vehicle of 3 to 8 rotors by itself, what is demanded of its mixer, and what it made of that in float; [SI].
+struct Mixed {
+  int rotors;
+  float hubs[8][2], drag_scale[8], smallest[8], largest[8];
+  int spins[8];
+  float per_newton, per_square_newton, demand[4], assured_yaw;
+  bool built;
+  float thrusts[8], achieved[4];
+  unsigned concessions;
+};
+
+/// The next of arm/demands.hpp after `state`. `curved`: torque per thrust depends on the thrust.
+[[gnu::visibility("default")]] Mixed mixed_in_float(std::uint32_t& state, bool curved);
+
 }  // namespace kphi::test

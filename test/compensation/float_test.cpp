@@ -84,9 +84,96 @@ TEST_P(InFloat, SpeedsAgreeWithDoubleToOnePartInAHundredThousand) {
   std::printf("%d speeds, %d of covered rotors: off by %.1e at most\n", compared, covered, worst);
 }
 
+/// The same in double, from the numbers that float was told.
+struct InDouble {
+  std::optional<compensation::MixedThrusts> mixed;
+  double condition = 0;
+};
+InDouble mixed_in_double(const Mixed& told) {
+  using namespace compensation;
+  const auto count = static_cast<std::size_t>(told.rotors);
+  RotorLayout layout{Rotors<HubPosition>(count), Rotors<int>(count)};
+  Rotors<Real> scale(count);
+  ThrustLimits limits{Rotors<Newtons>(count), Rotors<Newtons>(count)};
+  for (std::size_t i = 0; i < count; ++i) {
+    layout.hubs[i] = {Metres(told.hubs[i][0]), Metres(told.hubs[i][1])};
+    layout.spins[i] = told.spins[i];
+    scale[i] = told.drag_scale[i];
+    limits.smallest[i] = Newtons(told.smallest[i]);
+    limits.largest[i] = Newtons(told.largest[i]);
+  }
+  auto mixer = Mixer::build(layout, {Metres(told.per_newton), told.per_square_newton});
+  if (!mixer || !mixer->set_layout(layout, scale)) return {};
+  const Wrench demand{Newtons(told.demand[0]), NewtonMetres(told.demand[1]), NewtonMetres(told.demand[2]),
+                      NewtonMetres(told.demand[3])};
+  return {mixer->mix(demand, limits, NewtonMetres(told.assured_yaw)), condition_of(layout, scale)};
+}
+
+/// By how much two answers differ, as shares of the largest of the demand in newtons.
+struct Differences {
+  double wrench = 0, thrusts = 0;
+};
+Differences differences(const Mixed& told, const compensation::MixedThrusts& mixed) {
+  double reach = 0, arm = 0;
+  for (int i = 0; i < told.rotors; ++i) {
+    reach = std::max({reach, std::fabs(double{told.hubs[i][0]}), std::fabs(double{told.hubs[i][1]})});
+    arm = std::max(arm, double{told.per_newton} * told.drag_scale[i]);
+  }
+  const double units[] = {1, reach, reach, arm};
+  const double achieved[] = {mixed.achieved.thrust.value(), mixed.achieved.roll.value(), mixed.achieved.pitch.value(),
+                             mixed.achieved.yaw.value()};
+  double demand = 0;
+  Differences off;
+  for (int k = 0; k < 4; ++k) {
+    demand = std::max(demand, std::fabs(told.demand[k]) / units[k]);
+    off.wrench = std::max(off.wrench, std::fabs(told.achieved[k] - achieved[k]) / units[k]);
+  }
+  for (std::size_t i = 0; i < mixed.thrusts.size(); ++i)
+    off.thrusts = std::max(off.thrusts, std::fabs(told.thrusts[i] - mixed.thrusts[i].value()));
+  return {off.wrench / demand, off.thrusts / demand};
+}
+
+class Conceding : public testing::TestWithParam<unsigned> {};
+
+TEST_P(Conceding, DemandsAreMetAsInDouble) {
+  constexpr double kSame = 1e-4;
+  for (const bool curved : {false, true}) {
+    std::uint32_t state = GetParam();
+    int conceding = 0, ill = 0, ill_off = 0, others = 0, concessions_differ = 0, unfinished = 0;
+    Differences worst, worst_ill;
+    while (conceding < 62'500) {
+      const Mixed told = mixed_in_float(state, curved);
+      const InDouble real = mixed_in_double(told);
+      if (!told.built || !real.mixed || real.mixed->steps == 0) continue;
+      ++conceding;
+      concessions_differ += told.concessions != real.mixed->concessions.bits();
+      unfinished += real.mixed->concessions.has(compensation::Concession::unfinished);
+      const Differences off = differences(told, *real.mixed);
+      const bool well = real.condition < 1e5;
+      (well ? worst : worst_ill).wrench = std::max((well ? worst : worst_ill).wrench, off.wrench);
+      ASSERT_LE(well ? off.wrench : 0, kSame) << told.rotors << " rotors, condition " << real.condition;
+      ill += !well;
+      ill_off += !well && off.wrench > kSame;
+      // More than four rotors can make one wrench in many ways, and then the search for the smallest may end early.
+      others += off.thrusts > kSame && off.wrench <= kSame;
+      ASSERT_LE(told.rotors <= 4 ? off.thrusts : 0, kSame);
+    }
+    EXPECT_LE(ill_off, conceding / 2'000);
+    EXPECT_LE(others, conceding / 2'000);
+    EXPECT_LE(concessions_differ, conceding / 500);
+    EXPECT_LE(unfinished, conceding / 300);
+    std::printf(
+        "%s%d conceding demands: wrenches differ by %.1e of the demand; %d ill-conditioned: by %.1e, %d by more than "
+        "that much; another choice of thrusts: %d; concessions differ %d times; %d unfinished\n",
+        curved ? "curved, " : "", conceding, worst.wrench, ill, worst_ill.wrench, ill_off, others, concessions_differ,
+        unfinished);
+  }
+}
+
+/// On the square body, with the limits of occluded rotors.
 TEST_P(InFloat, DemandsAreMetAsInDouble) {
   Draw draw(GetParam() + 100);
-  int compared = 0, saturated = 0, often = 0, flags_differ = 0, concessions_differ = 0;
+  int compared = 0, saturated = 0, flags_differ = 0, often = 0;
   double worst = 0;
   for (int i = 0; i < 125'000; ++i) {
     Vehicle vehicle = draw.vehicle(i % 2 == 0 ? 0.05 : 0.8);
@@ -96,35 +183,22 @@ TEST_P(InFloat, DemandsAreMetAsInDouble) {
     if (!single.built || !real.built) continue;
     ++compared;
     saturated += real.concessions != 0;
-    double most = 1;
+    double most = 1, off = 0;
     for (int j = 0; j < 4; ++j) {
       ASSERT_TRUE(single.thrusts[j] >= 0 && single.thrusts[j] <= single.thrust_max[j]);
       flags_differ += single.flags[j] != real.flags[j];
       most = std::max(most, real.thrust_max[j]);
+      off = std::max(off, std::fabs(single.thrusts[j] - real.thrusts[j]));
     }
-    concessions_differ += single.concessions != real.concessions;
-    const auto missed = [&](const auto& by) {
-      return std::hypot(by.achieved[1] - vehicle.demand[1], by.achieved[2] - vehicle.demand[2]);
-    };
-    const double more = (missed(single) - missed(real)) / most;
-    worst = std::max(worst, more);
-    often += more > 1e-5;
-    const double yaw = vehicle.demand[3];
-    // Of some 0.5 N m that the four can make.
-    ASSERT_GE(single.achieved[3], std::min(yaw, 0.0) - 2e-4);
-    ASSERT_LE(single.achieved[3], std::max(yaw, 0.0) + 2e-4);
+    worst = std::max(worst, off / most);
+    often += off / most > 1e-3;
   }
   EXPECT_GT(compared, 100'000);
   EXPECT_GT(saturated, 10'000);
-  // Rows that are nearly parallel over the free rotors: float takes the one for the other.
-  EXPECT_LT(worst, 2e-3) << "m";
-  EXPECT_LT(often, saturated / 500);
+  EXPECT_LE(often, saturated / 10'000) << "arms that nearly make one line of three rotors";
   EXPECT_LT(flags_differ, compared / 1000);
-  EXPECT_LT(concessions_differ, compared / 500);
-  std::printf(
-      "%d demands, %d saturated: roll and pitch miss by %.1e N m per N more at most, %d times by 1e-5; flags "
-      "differ %d times, concessions %d\n",
-      compared, saturated, worst, often, flags_differ, concessions_differ);
+  std::printf("%d demands, %d saturated: thrusts differ by %.1e of the largest, %d times by 1e-3; flags %d times\n",
+              compared, saturated, worst, often, flags_differ);
 }
 
 TEST(InFloatOdd, NoNaNComesOutWhateverGoesIn) {
@@ -143,6 +217,7 @@ TEST(InFloatOdd, NoNaNComesOutWhateverGoesIn) {
   }
 }
 
+INSTANTIATE_TEST_SUITE_P(Seeds, Conceding, testing::Values(1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u));
 INSTANTIATE_TEST_SUITE_P(Seeds, InFloat, testing::Values(1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u));
 
 }  // namespace kphi::test::float_test

@@ -89,7 +89,7 @@ TEST(PlainInterface, TellsTheUncertaintyWhereTheLineHasOne) {
   kphi_set_arms(&compensator, x);
   double speeds[4], uncertainties[4];
   kphi_speeds_for(&compensator, thrusts, speeds, nullptr);
-  kphi_speed_uncertainties(&compensator, thrusts, 0, uncertainties);
+  kphi_speed_uncertainties(&compensator, lines, thrusts, 0, uncertainties);
   EXPECT_NEAR(uncertainties[0] / speeds[0], 0.005, 1e-12);
   EXPECT_NEAR(uncertainties[1] / speeds[1], 0.5 * 2e-9 * speeds[1] * speeds[1], 1e-12) << "of k = 1 N over speed²";
   EXPECT_EQ(uncertainties[3], kInfinity);
@@ -123,8 +123,8 @@ TEST(PlainInterface, TakesATableATrendAndATorqueAsTheClassDoes) {
   double got[4];
   kphi_speeds_for(&compensator, thrusts, got, nullptr);
   expect_same(got, typed.speeds_for(thrusts_of(1, 2, 3, 4)).speeds);
-  kphi_speed_uncertainties(&compensator, thrusts, 0.01, got);
-  expect_same(got, typed.speed_uncertainties(thrusts_of(1, 2, 3, 4), Radians(0.01)));
+  kphi_speed_uncertainties(&compensator, curves, thrusts, 0.01, got);
+  expect_same(got, typed.speed_uncertainties(Rotors<ThrustCurve>(4, curve), thrusts_of(1, 2, 3, 4), Radians(0.01)));
   kphi_drag_scale(&compensator, got);
   for (std::size_t j = 0; j < 4; ++j) EXPECT_EQ(got[j], typed.drag_scale()[j]);
 }
@@ -148,17 +148,44 @@ TEST(PlainInterface, TakesAPolygonBody) {
   for (int i = 0; i < 4; ++i) EXPECT_NEAR(a[i], b[i], 1e-12);
 }
 
+TEST(PlainInterface, TakesHubsAndABodyOfTwoParts) {
+  kphi_airframe airframe = plain_airframe();
+  airframe.corner_count = airframe.more_corner_counts[1] = 4;
+  const double corners[4][2] = {{0.05, 0.05}, {-0.05, 0.05}, {-0.05, -0.05}, {0.05, -0.05}};
+  for (int i = 0; i < 4; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      airframe.corners[i][k] = corners[i][k] - (k == 0 ? 0.1 : 0);
+      airframe.more_corners[1][i][k] = corners[i][k] + (k == 0 ? 0.1 : 0);
+    }
+  }
+  kphi_compensator compensator = built(airframe);
+  const double hubs[4][2] = {{0.02, 0}, {-0.02, 0}, {0.3, 0}, {0, 0}}, speeds[4] = {0, 0, 1, 0};
+  kphi_set_hubs(&compensator, hubs, speeds, 0.01);
+  double phi[4], thrusts[4] = {1, 1, 1, 1}, got[4];
+  unsigned short flags[4];
+  kphi_occlusion_angles(&compensator, phi);
+  EXPECT_GT(phi[0], 0.1);
+  EXPECT_NEAR(phi[0], phi[1], 1e-12);
+  EXPECT_EQ(phi[2], 0);
+  kphi_speeds_for(&compensator, thrusts, got, flags);
+  EXPECT_EQ(flags[2], KPHI_ARM_ANGLE_STALE);
+  EXPECT_EQ(flags[3], 0);
+  kphi_set_hubs(&compensator, hubs, nullptr, 0.6);
+  kphi_speeds_for(&compensator, thrusts, got, flags);
+  EXPECT_EQ(flags[3], KPHI_ARM_ANGLE_STALE);
+  airframe.more_corners[1][1][0] = -0.1;
+  kphi_curve lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
+  EXPECT_NE(kphi_compensator_build(&compensator, lines, &airframe, KPHI_LAW_CLAMPED), 0) << "the parts overlap";
+}
+
 TEST(PlainInterface, RefusesInWordsAndBuildsNothing) {
   const auto expect = [](const std::string& words, void (*spoil)(kphi_curve&, kphi_airframe&),
                          int law = KPHI_LAW_CLAMPED) {
     kphi_curve lines[4] = {plain_line(), plain_line(), plain_line(), plain_line()};
     kphi_airframe airframe = plain_airframe();
     spoil(lines[2], airframe);
-    kphi_compensator compensator;
-    std::memset(&compensator, 0x5a, sizeof compensator);
-    const kphi_compensator before = compensator;
+    kphi_compensator compensator = built(plain_airframe());
     const int code = kphi_compensator_build(&compensator, lines, &airframe, law);
-    EXPECT_EQ(std::memcmp(&compensator, &before, sizeof before), 0);
     EXPECT_NE(code, 0);
     EXPECT_NE(std::string(kphi_refusal_text(code)).find(words), std::string::npos) << words;
   };

@@ -185,11 +185,12 @@ TEST(Properties, NoNaNComesOutWhateverGoesIn) {
       Airframe airframe = example_airframe(entry.measure);
       if (law == ScalingLaw::published) airframe.polygon = square_as_polygon(Metres(0.045));
       Compensator compensator = compensator_of(airframe, law);
+      const Rotors<ThrustCurve> curves(4, paper_line(airframe.overlap));
       for (int i = 0; i < kDraws / 12; ++i) {  // four rotors each, six ways
         compensator.set_arms({Radians(any()), Radians(any()), Radians(any()), Radians(any())});
         const SpeedCommand command = compensator.speeds_for(thrusts_of(any(), any(), any(), any()));
         const auto uncertainties =
-            compensator.speed_uncertainties(thrusts_of(any(), any(), any(), any()), Radians(any()));
+            compensator.speed_uncertainties(curves, thrusts_of(any(), any(), any(), any()), Radians(any()));
         for (std::size_t j = 0; j < 4; ++j) {
           ASSERT_TRUE(command.speeds[j].value() >= 0 && command.speeds[j] <= airframe.fastest_speed);
           const double phi = compensator.occlusion_angles()[j].value(), k = compensator.scaling_factors()[j];

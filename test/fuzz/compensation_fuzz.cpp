@@ -107,7 +107,8 @@ Airframe airframe(Bytes& bytes, OverlapMeasure overlap) {
   return frame;
 }
 
-void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes& bytes) {
+void fly(Compensator& compensator, const Rotors<ThrustCurve>& curves, const Airframe& frame, ScalingLaw law,
+         Bytes& bytes) {
   Rotors<Radians> arms(compensator.rotors());
   Rotors<Newtons> thrusts(compensator.rotors());
   for (Radians& arm : arms) arm = Radians(bytes.number(4));
@@ -115,7 +116,7 @@ void fly(Compensator& compensator, const Airframe& frame, ScalingLaw law, Bytes&
   compensator.enable(bytes.byte() % 4 != 0);
   compensator.set_arms(arms);
   const SpeedCommand command = compensator.speeds_for(thrusts);
-  const auto uncertainties = compensator.speed_uncertainties(thrusts, Radians(bytes.number(0.1)));
+  const auto uncertainties = compensator.speed_uncertainties(curves, thrusts, Radians(bytes.number(0.1)));
   for (std::size_t i = 0; i < compensator.rotors(); ++i) {
     const double phi = compensator.occlusion_angles()[i].value(), k = compensator.scaling_factors()[i];
     require(phi >= 0.0 && phi <= 2 * kPi);
@@ -193,7 +194,7 @@ void fly_in_c(Bytes& bytes) {
   for (int i = 0; i < KPHI_MAX_ROTORS; ++i) arms[i] = bytes.number(4), thrusts[i] = bytes.number(8);
   kphi_set_arms(&compensator, arms);
   kphi_speeds_for(&compensator, thrusts, speeds, bytes.byte() % 2 == 0 ? flags : nullptr);
-  kphi_speed_uncertainties(&compensator, thrusts, bytes.number(0.1), uncertainties);
+  kphi_speed_uncertainties(&compensator, lines, thrusts, bytes.number(0.1), uncertainties);
   for (int i = 0; i < 4; ++i) require(speeds[i] >= 0 && speeds[i] <= airframe.fastest_speed && uncertainties[i] >= 0);
 }
 
@@ -206,13 +207,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto some = curve_of(bytes, overlap), other = curve_of(bytes, overlap);
   const Airframe frame = airframe(bytes, overlap);
   std::optional<Compensator> compensator;
+  std::optional<Rotors<ThrustCurve>> curves;
   if (some && other) {
-    Rotors<ThrustCurve> curves(rotors_of(frame), *some);
-    for (std::size_t i = 1; i < curves.size(); i += 2) curves[i] = *other;
-    compensator = Compensator::build(curves, frame, law).compensator;
+    curves.emplace(rotors_of(frame), *some);
+    for (std::size_t i = 1; i < curves->size(); i += 2) (*curves)[i] = *other;
+    compensator = Compensator::build(*curves, frame, law).compensator;
   }
   for (int i = 0; i < 50 && bytes.more(); ++i) {
-    if (compensator) fly(*compensator, frame, law, bytes);
+    if (compensator) fly(*compensator, *curves, frame, law, bytes);
     mix(compensator ? &*compensator : nullptr, bytes);
     fly_in_c(bytes);
   }

@@ -1,9 +1,13 @@
-// How many instructions the calls of the library take on this processor: "name count" a line. Under qemu with
-// `-icount shift=0` an instruction takes one nanosecond of the board's time, which SysTick counts.
+// How many instructions the calls of the library take on this processor, and how much stack and memory: "name number" a
+// line. Under qemu with `-icount shift=0` an instruction takes one nanosecond of the board's time, which SysTick
+// counts.
+#include <cmath>
 #include <cstdint>
 
 #include "compensation/compensator.hpp"
+#include "compensation/kphi_compensation.h"
 #include "compensation/mixing.hpp"
+#include "test/compensation/arm/demands.hpp"
 
 extern "C" void print(const char* text);
 
@@ -27,11 +31,18 @@ void print_number(unsigned number) {
   print(at);
 }
 
+void tell(const char* name, unsigned number) {
+  print(name);
+  print(" ");
+  print_number(number);
+  print("\n");
+}
+
 template <class Call>
-std::uint32_t ticks_of(const Call& call) {
+std::uint32_t ticks_of(const Call& call, int repetitions = kRepetitions) {
   value = 0;
   const std::uint32_t before = value;
-  for (int i = 0; i < kRepetitions; ++i) call(i);
+  for (int i = 0; i < repetitions; ++i) call(i);
   return (before - value) & 0xFFFFFFu;
 }
 
@@ -44,11 +55,98 @@ void count(const char* name, const Call& call) {
     __asm__ volatile("" ::: "memory");
     call(i);
   });
-  print(name);
-  print(" ");
-  print_number((taken - empty) * kNanosecondsPerTick / kRepetitions);
-  print("\n");
+  tell(name, (taken - empty) * kNanosecondsPerTick / kRepetitions);
 }
+
+#if DEMANDS > 0
+/// The longest of DEMANDS demands on random vehicles that must be searched for.
+void count_searches(const char* name, bool curved) {
+  test::Demands demands(12345);
+  std::uint32_t longest = 0;
+  for (int i = 0; i < DEMANDS; ++i) {
+    const test::Demand one = demands.next(curved);
+    auto mixer = Mixer::build(one.layout, one.drag);
+    if (!mixer || !mixer->set_layout(one.layout, one.drag_scale)) continue;
+    const std::uint32_t taken =
+        ticks_of([&](int) { sink = mixer->mix(one.wrench, one.limits, one.assured_yaw).achieved.yaw.value(); }, 1);
+    longest = taken > longest ? taken : longest;
+  }
+  tell(name, longest * kNanosecondsPerTick);
+}
+
+/// The stack below a call is painted, and how deep the paint is gone is what the call takes.
+template <class Call>
+[[gnu::noinline]] void measure_stack(const char* name, const Call& call) {
+  constexpr int kDeep = 4096;
+  constexpr std::uint32_t kPaint = 0xA5A5A5A5u;
+  char* top;
+  __asm__ volatile("mov %0, sp" : "=r"(top));
+  auto* const paint = reinterpret_cast<volatile std::uint32_t*>(top) - 4;
+  for (int i = 1; i < kDeep; ++i) paint[-i] = kPaint;
+  call();
+  int deepest = kDeep - 1;
+  while (deepest > 0 && paint[-deepest] == kPaint) --deepest;
+  tell(name, static_cast<unsigned>(4 * (deepest + 4)));
+}
+
+/// Of the dearest vehicle: eight rotors with full tables on a body of twelve corners.
+void measure_stacks() {
+  static kphi_curve curves[8];
+  static kphi_airframe airframe;
+  static kphi_compensator compensator;
+  static kphi_mixer mixer;
+  static kphi_real hubs[8][2], arms[8], smallest[8], largest[8], scale[8], got[8], achieved[4];
+  static int spins[8];
+  static unsigned short flags[8];
+  constexpr kphi_real kWrench[4] = {20, 3, -3, 1};
+  airframe.half_side = kphi_real(0.045);
+  airframe.arm_length = kphi_real(0.117);
+  airframe.propeller_radius = kphi_real(0.0635);
+  airframe.fastest_speed = 2000;
+  airframe.rotors = 8;
+  airframe.corner_count = KPHI_MAX_CORNERS;
+  for (int i = 0; i < KPHI_MAX_CORNERS; ++i) {
+    const kphi_real angle = 2 * kPi * static_cast<kphi_real>(i) / 12;
+    airframe.corners[i][0] = kphi_real(0.06) * std::cos(angle);
+    airframe.corners[i][1] = kphi_real(0.06) * std::sin(angle);
+  }
+  for (int i = 0; i < 8; ++i) {
+    const kphi_real angle = 2 * kPi * static_cast<kphi_real>(i) / 8;
+    airframe.hinge_turn_rad[i] = angle;
+    airframe.hinges[i][0] = kphi_real(0.06) * std::cos(angle);
+    airframe.hinges[i][1] = kphi_real(0.06) * std::sin(angle);
+    hubs[i][0] = kphi_real(0.18) * std::cos(angle);
+    hubs[i][1] = kphi_real(0.17) * std::sin(angle);
+    spins[i] = i % 2 == 0 ? 1 : -1;
+    arms[i] = 3;
+    largest[i] = 5;
+    scale[i] = 1;
+    kphi_curve& curve = curves[i];
+    curve.largest_fitted_rad = kphi_real(4.7);
+    curve.knot_count = curve.torque_count = KPHI_MAX_KNOTS;
+    for (int k = 0; k < KPHI_MAX_KNOTS; ++k) {
+      const kphi_real phi = kphi_real(0.4) * static_cast<kphi_real>(k);
+      curve.knots[k] = {phi, kphi_real(1.5e-6) * (1 - kphi_real(0.1) * phi), 0};
+      curve.torque[k] = {phi, 1, 0};
+    }
+    curve.trend_per_rad_s = kphi_real(1e-4);
+    curve.trend_reference = 1000;
+  }
+  int refused = 1, flown = 0;
+  measure_stack("stack_build", [&] { refused = kphi_compensator_build(&compensator, curves, &airframe, 0); });
+  measure_stack("stack_set_arms", [&] { kphi_set_arms(&compensator, arms); });
+  measure_stack("stack_speeds_for", [&] { kphi_speeds_for(&compensator, largest, got, flags); });
+  measure_stack("stack_mixer_build",
+                [&] { flown = kphi_mixer_build(&mixer, 8, hubs, spins, kphi_real(0.0133), kphi_real(1e-4)); });
+  measure_stack("stack_set_layout", [&] { flown &= kphi_mixer_set_layout(&mixer, hubs, spins, scale); });
+  int conceded = 0;
+  measure_stack("stack_mix",
+                [&] { conceded = kphi_mix(&mixer, kWrench, smallest, largest, kphi_real(0.02), got, achieved); });
+  tell("stacks_are_of_what_flies", refused == 0 && flown == 1 && conceded != 0 ? 1 : 0);
+  tell("bytes_compensator", sizeof(kphi_compensator));
+  tell("bytes_mixer", sizeof(kphi_mixer));
+}
+#endif
 
 Rotors<Radians> all_at(Real degrees) { return Rotors<Radians>(4, from_degrees(degrees)); }
 
@@ -91,5 +189,10 @@ int main() {
   const Wrench yawing = wrench(6, 0, 0, Real(0.1)), torn = wrench(6, 9, -9, 9);
   count("mix_short_of_yaw", [&](int) { sink = mixer->mix(yawing, limits, NewtonMetres(0)).achieved.yaw.value(); });
   count("mix_short_of_all", [&](int) { sink = mixer->mix(torn, limits, NewtonMetres(0)).achieved.yaw.value(); });
+#if DEMANDS > 0
+  count_searches("longest_search", false);
+  count_searches("longest_search_curved", true);
+  measure_stacks();
+#endif
   return 0;
 }

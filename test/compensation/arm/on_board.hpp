@@ -21,6 +21,17 @@ struct Processor {
 };
 inline constexpr Processor kM4f{"cortex-m4", "mps2-an386"}, kM7{"cortex-m7", "mps2-an500"};
 
+/// What the library takes in a build, of which the first is the one to fly: the bounds that README.md tells.
+struct Build {
+  const char* type;  ///< of CMake's
+  int code, set_arms_o, mix_and_speeds_for, longest_search;
+};
+inline constexpr Build kBuilds[] = {{"MinSizeRel", 15'600, 3'200, 1'500, 25'000},
+                                    {"RelWithDebInfo", 18'400, 3'200, 1'500, 25'000},
+                                    {"Release", 38'000, 3'200, 1'500, 22'000}};
+/// In every one of them, for four rotors as for eight [bytes].
+inline constexpr int kStack = 1024, kCompensatorBytes = 2048;
+
 /// What is missing to build and run; empty: nothing.
 inline std::string missing_for_boards() {
   const char* path = std::getenv("PATH");
@@ -37,17 +48,18 @@ inline std::string missing_for_boards() {
 class OnBoard {
  public:
   /// `type`: of CMake's builds, such as Release. Throws what the build says if it fails.
-  OnBoard(const Processor& processor, const std::string& type, bool in_float = true) : processor_(processor) {
+  OnBoard(const Processor& processor, const std::string& type, bool in_float = true, int demands = 1000)
+      : processor_(processor) {
     const std::string source = source_dir();
     (void)output_of({"cmake", "-S", source + "/test/compensation/arm", "-B", built(), "-G", "Ninja",
                      "-DCMAKE_TOOLCHAIN_FILE=" + source + "/test/compensation/arm/toolchain.cmake",
                      std::string("-DCPU=") + processor.name, "-DCMAKE_BUILD_TYPE=" + type,
-                     "-DLIBRARY=" + source + "/compensation",
+                     "-DLIBRARY=" + source + "/compensation", "-DDEMANDS=" + std::to_string(demands),
                      std::string("-DKPHI_COMPENSATION_FLOAT=") + (in_float ? "ON" : "OFF")});
     (void)output_of({"cmake", "--build", built(), "--parallel", "1"});
   }
 
-  /// Instructions of each call that counts.cpp counts.
+  /// Each number that counts.cpp tells: instructions of calls, bytes of stacks and of what is kept.
   [[nodiscard]] std::map<std::string, int> counts() const {
     std::istringstream lines(output_of({"qemu-system-arm", "-M", processor_.board, "-nographic", "-semihosting",
                                         "-icount", "shift=0", "-kernel", built() + "/counts"}));
@@ -56,9 +68,9 @@ class OnBoard {
     for (int count = 0; lines >> name >> count;) counts[name] = count;
     return counts;
   }
-  /// What those calls link of the library: its code without the mathematics of the compiler's.
+  /// What the classes' calls link of the library: its code without its C interface and the compiler's mathematics.
   [[nodiscard]] long code_bytes() const {
-    std::istringstream symbols(output_of({"arm-none-eabi-nm", "-S", built() + "/counts"}));
+    std::istringstream symbols(output_of({"arm-none-eabi-nm", "-S", built() + "/flight"}));
     std::map<std::string, long> sizes;  // by address: constructors have two names
     for (std::string line; std::getline(symbols, line);) {
       std::istringstream fields(line);

@@ -50,7 +50,8 @@ std::vector<profiles::Vehicle> vehicles() {
   std::vector<compensation::Position> outline;
   for (const auto& [x, y] : corners) outline.push_back({Metres(x), Metres(y)});
   other.name = "six.corners";
-  other.body = {*compensation::ConvexPolygon::from(outline.data(), outline.size()), Rotors<compensation::Hinge>(4)};
+  other.body = compensation::PolygonBody{*compensation::ConvexPolygon::from(outline.data(), outline.size()),
+                                         Rotors<compensation::Hinge>(4)};
   other.half_side = Metres(0);
   const std::size_t at[] = {1, 3, 4, 0};
   for (std::size_t i = 0; i < 4; ++i)
