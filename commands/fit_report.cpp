@@ -285,10 +285,11 @@ ExitCode run_fit(const FitRequest& request) {
   Fitted fitted{identify_input(input, request), {}};
   const Identification& identification = fitted.identification;
   if (const double K_T = identification.thrust_coefficient().value; !(K_T > 0))
-    throw DataRejected(fmt::format(
-        "{}: K_T is {:.3e} N/(rad/s)^2 and must be positive; mirror thrust_axis in the bench file, or import with "
-        "--reverse-thrust",
-        request.path, K_T));
+    throw DataRejected(
+        fmt::format("{}: K_T is {:.3e} N/(rad/s)^2 and must be positive: thrust does not rise with speed; mirror "
+                    "thrust_axis in the "
+                    "bench file if its sign is reversed",
+                    request.path, K_T));
   // A table that lies in a campaign's folder is not the campaign.
   const bool is_apart = !input.campaign && fs::exists(input.folder / "journal.jsonl");
   const std::string apart = is_apart ? fs::path(request.path).stem().string() + "_" : "";
