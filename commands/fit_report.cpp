@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "base/csv.hpp"
 #include "base/number.hpp"
@@ -354,6 +355,13 @@ ExitCode report_several(const ReportRequest& request) {
     family.push_back(std::move(fitted));
     chapters.push_back({std::move(input.provenance), drawn});
   }
+  const auto alone = std::ranges::count_if(family, [](const Fitted& one) { return one.identification.alone(); });
+  if (std::cmp_equal(alone, family.size())) {
+    write_page(page, format_reports(family, chapters, {}, nullptr));
+    return ExitCode::ok;
+  }
+  if (alone > 0)
+    throw ConfigurationError("logs without occlusions and campaigns do not fit on one page; report them apart");
   std::optional<History> history;
   if (family.size() >= kLeastHistory && of_one_propeller(family)) {
     std::vector<std::string> when;

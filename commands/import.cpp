@@ -14,7 +14,6 @@
 #include "commands/inputs.hpp"
 #include "commands/outputs.hpp"
 #include "fit/logs/import_table.hpp"
-#include "fit/logs/throttle_law.hpp"
 #include "results/digest.hpp"
 #include "results/file_layer.hpp"
 #include "results/steps_csv.hpp"
@@ -140,7 +139,7 @@ ImportedLog write_import(const std::string& path, const Import& import, const st
   print_findings(import, judged, path);
   fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(table, judged.fits)));
   if (!request.json)
-    for (const std::string& line : throttle_lines(table)) fmt::print("  {}\n", line);
+    for (const std::string& line : judged.throttle) fmt::print("  {}\n", line);
   return {{name, judged.fits.front().fit.parameters.k}, spoilt(import, judged), folder.string()};
 }
 

@@ -14,7 +14,6 @@
 #include "base/text.hpp"
 #include "compensation/units.hpp"
 #include "fit/logs/row_groups.hpp"
-#include "fit/logs/throttle_law.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/thrust_fit.hpp"
 
@@ -242,7 +241,7 @@ std::string import_record(const Import& import, const JudgedFit& judged, const s
               {"u_speed_share", judged.u_speed},
               {"propeller", import.table.propeller},
               {"k_means_nothing", spoilt(import, judged)},
-              {"throttle_laws", throttle_lines(import.table)},
+              {"throttle_laws", judged.throttle},
               {"columns_left_out", import.table.unread},
               {"findings", findings},
               {"lines_left_out", problems}};

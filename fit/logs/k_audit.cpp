@@ -9,6 +9,7 @@
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
 #include "fit/logs/row_groups.hpp"
+#include "fit/logs/throttle_law.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -209,15 +210,18 @@ std::vector<LogFinding> audit_rows(ImportedTable& table) {
 }
 
 void leave_out_obvious(ImportedTable& table) {
-  ImportedTable without = table;
-  if (audit_rows(without).empty()) return;
-  const double all = 1 - line_through(some_of(kept_points(table))).correlation,
-               kept = 1 - line_through(some_of(kept_points(without))).correlation;
-  if (2 * kept < all) table.left_out = std::move(without.left_out);
+  const std::vector<std::uint32_t> flags = table.quality_flags;
+  std::vector<bool> left_out = table.left_out;
+  const double all = 1 - line_through(some_points(table)).correlation;
+  if (audit_rows(table).empty()) return;
+  const double kept = 1 - line_through(some_points(table)).correlation;
+  table.quality_flags = flags;
+  if (!(2 * kept < all)) table.left_out = std::move(left_out);
 }
 
 JudgedFit judged_fit(const ImportedTable& table) {
   JudgedFit judged;
+  judged.throttle = throttle_lines(table);
   const double step = speed_step_rpm(table);
   const double share = step > 0 ? share_of_step(table, from_rpm(step / 2).value()) : 0;
   judged.u_speed = share / 2;
@@ -232,9 +236,12 @@ JudgedFit judged_fit(const ImportedTable& table) {
          {}});
   }
   std::map<double, std::vector<Point>> points;
-  for (std::size_t i = 0; i < table.size(); ++i)
-    if (!table.is_left_out(i))
-      points[table.rows[i].occlusion_deg.value_or(0)].push_back({table.speed_rad_s(i), table.thrust_n(i)});
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    if (table.is_left_out(i)) continue;
+    std::vector<Point>& its = points[table.rows[i].occlusion_deg.value_or(0)];
+    if (its.empty() && points.size() == 1) its.reserve(table.size());
+    its.push_back({table.speed_rad_s(i), table.thrust_n(i)});
+  }
   for (auto& [occlusion, its] : points) judged.fits.push_back(fit_of(occlusion, std::move(its), table, share));
   for (const OcclusionFit& one : judged.fits) judge(one, table, judged.findings);
   return judged;

@@ -33,6 +33,7 @@ struct OcclusionFit {
 struct JudgedFit {
   std::vector<OcclusionFit> fits;  ///< by occlusion
   std::vector<LogFinding> findings;
+  std::vector<std::string> throttle;  ///< throttle_lines()
   double u_speed = 0;  ///< relative standard uncertainty of all speeds together, of their steps; 0: they have none
 };
 /// Throws FitError as fit_thrust does.

@@ -149,7 +149,14 @@ void find_names(const std::vector<Line>& lines, const std::vector<Content>& cont
   std::optional<std::size_t> comment;
   for (std::size_t i = shape.first; i-- > 0;) {
     if (contents[i].comment) {
-      if (!comment) comment = i;
+      // "%;g;RPM" is a line of units.
+      const auto perhaps = names_in(lines[i].text, shape.separator, shape.fields);
+      if (!shape.units && mostly_units(perhaps)) {
+        shape.units = i;
+        shape.unit_names = perhaps;
+      } else if (!comment) {
+        comment = i;
+      }
       continue;
     }
     if (contents[i].row() && contents[i].fields != shape.fields && odd++ < kOddRows) continue;
@@ -227,7 +234,7 @@ Shape shape_of(const std::vector<Line>& lines, char separator) {
       static_cast<std::size_t>(std::ranges::find_if(runs, [&](std::size_t n) { return n >= enough; }) - runs.begin());
   find_names(lines, contents, shape);
   // Blanks are inside of names and of grouped numbers, too.
-  const double likely = separator == ' ' ? 0.9 : 1;
+  const double likely = separator == ' ' ? 0.7 : 1;
   shape.score = likely * static_cast<double>(most->second) * numbers / (numbers + words) * (shape.header ? 2 : 1) *
                 (1 + 1e-3 * static_cast<double>(std::min<std::size_t>(shape.fields, 100)));
   return shape;
@@ -294,7 +301,7 @@ class RoleFinder {
   [[nodiscard]] std::string unit_of(std::size_t index, Measure measure) const {
     std::string unit = shape_.names.empty() ? "" : unit_in(shape_.names[index], measure);
     if ((unit.empty() || !unit_named(measure, unit)) && index < shape_.unit_names.size())
-      if (const std::string& below = shape_.unit_names[index]; !below.empty())
+      if (const std::string& below = shape_.unit_names[index]; !says_nothing(below))
         unit = split_header(below).unit.empty() ? below : split_header(below).unit;
     return unit;
   }
@@ -603,7 +610,7 @@ Layout find_layout(std::string_view begin, const std::string& path, const Layout
   const std::size_t above = std::max(layout.header_line, layout.units_line);
   layout.first_row = above > 0 ? above + 1 : lines[shape.first].number;
   for (const Line& line : lines)
-    if (layout.comment.empty()) layout.comment = line.comment;
+    if (layout.comment.empty() && line.number != layout.units_line) layout.comment = line.comment;
   RoleFinder(path, lines, shape, hints, layout).find();
   const SampleRows rows = rows_of(begin, layout);
   layout.numbers = marks_of(path, rows, layout, hints);

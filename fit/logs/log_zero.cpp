@@ -52,17 +52,23 @@ double highest_thrust(const std::vector<Point>& points) {
   return highest;
 }
 
-double typical_k_of(const ImportedTable& table) {
+double typical_k_of(const ImportedTable& table, double zero_n) {
   double products = 0, fourth = 0;
   for (std::size_t i = 0; i < table.size(); ++i) {
     const double x = square(table.speed_rad_s(i));
-    products += x * table.thrust_n(i), fourth += x * x;
+    products += x * (table.thrust_n(i) - zero_n), fourth += x * x;
   }
   return std::abs(products / fourth);
 }
 
-ZeroOfLog fitted_zero(const std::vector<Point>& all, bool series) {
-  const std::vector<Point> points = some_of(all);
+/// Of rows with the motor off, of which k must not depend too much.
+ZeroOfLog tied_zero(double zero_n, double u_n, const ImportedTable& table) {
+  constexpr double kSurely = 0.0125;  // four times as much is 5 % of k
+  const bool known = u_n * k_per_zero(table) < kSurely * typical_k_of(table, zero_n);
+  return {known ? ZeroOfLog::Source::motor_off : ZeroOfLog::Source::unknown, zero_n, u_n};
+}
+
+ZeroOfLog fitted_zero(const std::vector<Point>& points, bool series) {
   const ThrustLine line = line_through(points);
   double per_zero = 0, fourth = 0;
   for (const Point& point : points) per_zero += square(point.speed_rad_s), fourth += square(square(point.speed_rad_s));
@@ -109,10 +115,10 @@ ZeroOfLog zero_of(const LogRest& rest, const ImportedTable& table, const RowSele
     const double drift = after ? after->mean_n - before->mean_n : 0;
     const double u = std::hypot(before->sd_n / std::sqrt(static_cast<double>(before->rows)), drift / std::sqrt(12.0));
     if (std::abs(before->mean_n) > std::max(5e-3 * largest, 3 * before->u_mean()))
-      return {ZeroOfLog::Source::motor_off, before->mean_n + drift / 2, u};
+      return tied_zero(before->mean_n + drift / 2, u, table);
     return {};
   }
-  return fitted_zero(kept_points(table), rows >= kRowsOfASeries);
+  return fitted_zero(some_points(table), rows >= kRowsOfASeries);
 }
 
 std::vector<LogFinding> findings_of(const ZeroOfLog& zero, const ImportedTable& table) {
@@ -132,15 +138,16 @@ std::vector<LogFinding> findings_of(const ZeroOfLog& zero, const ImportedTable& 
                      zero.zero_n, 100 * std::abs(zero.zero_n) / largest),
          {}}};
   }
-  return {{FindingKind::zero_unknown,
-           table.size(),
-           0,
-           fmt::format(
-               "no rows with the motor off, and {:.0f} to {:.0f} RPM do not tell a zero of {:.2g} N from a k {:.0f} % "
-               "off; log it with the motor off first, or say --tared if the stand was tared",
-               to_rpm(RadPerSec(low)), to_rpm(RadPerSec(high)), zero.u_n,
-               std::min(999.0, 100 * zero.u_n * k_per_zero(table) / typical_k_of(table))),
-           {}}};
+  return {
+      {FindingKind::zero_unknown,
+       table.size(),
+       0,
+       fmt::format(
+           "too few rows with the motor off, or none, and {:.0f} to {:.0f} RPM do not tell a zero of {:.2g} N from a k "
+           "{:.0f} % off; log it with the motor off first, or say --tared if the stand was tared",
+           to_rpm(RadPerSec(low)), to_rpm(RadPerSec(high)), zero.u_n,
+           std::min(999.0, 100 * zero.u_n * k_per_zero(table) / typical_k_of(table, zero.zero_n))),
+       {}}};
 }
 
 }  // namespace kphi::fit

@@ -66,7 +66,9 @@ bool has_two_directions(const StandLog& log, SpeedSource source) {
   const double seen = kThrustSeen * largest_thrust(log);
   std::vector<std::pair<double, double>> up, down;
   double most_up = 0, most_down = 0;
-  for (const StandRow& row : log.rows) {
+  const std::size_t every = log.rows.size() / 20'000 + 1;
+  for (std::size_t i = 0; i < log.rows.size(); i += every) {
+    const StandRow& row = log.rows[i];
     const double rpm = std::abs(rpm_of(row, source).value_or(0));
     if (rpm == 0 || std::abs(row.thrust_n) < seen) continue;
     (row.thrust_n > 0 ? up : down).emplace_back(rpm * rpm, row.thrust_n);

@@ -57,8 +57,8 @@ struct ImportedTable {
 
 /// One point a row, without uncertainties.
 [[nodiscard]] std::vector<Point> points_of(const ImportedTable& imported);
-/// Of the rows that are not left out.
-[[nodiscard]] std::vector<Point> kept_points(const ImportedTable& imported);
+/// Of at most 20,000 of the rows that are not left out, from all over the log: enough to judge by.
+[[nodiscard]] std::vector<Point> some_points(const ImportedTable& imported);
 
 /// The source that `selection` takes. Throws ConfigurationError if the file does not have it.
 [[nodiscard]] SpeedSource choose_speed(const StandLog& log, const RowSelection& selection);

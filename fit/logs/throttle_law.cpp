@@ -142,7 +142,7 @@ bool told_apart(const ThrottleLaw& one, const ThrottleLaw& other) {
 }
 
 std::vector<std::string> throttle_lines(const ImportedTable& table) {
-  constexpr std::size_t kMost = 20'000;
+  constexpr std::size_t kMost = 1000;  // each of a time series brings little beside its neighbours
   std::vector<ThrottlePoint> points;
   const std::size_t every = table.size() / kMost + 1;
   for (std::size_t i = 0; i < table.size(); i += every) {

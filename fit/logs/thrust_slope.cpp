@@ -54,18 +54,9 @@ ThrustLine line_through(const std::vector<Point>& points) {
   return line;
 }
 
-std::vector<Point> some_of(const std::vector<Point>& points) {
-  constexpr std::size_t kEnough = 20'000;
-  if (points.size() <= kEnough) return points;
-  std::vector<Point> some;
-  for (std::size_t i = 0; i < kEnough; ++i) some.push_back(points[i * points.size() / kEnough]);
-  return some;
-}
-
-ThrustSign sign_of(const std::vector<Point>& all) {
+ThrustSign sign_of(const std::vector<Point>& points) {
   constexpr double kAlike = 1.15;  // speeds
   constexpr double kSurely = 4;    // standard errors of a correlation
-  const std::vector<Point> points = some_of(all);
   double low = INFINITY, high = 0, sum = 0;
   for (const Point& point : points) {
     low = std::min(low, point.speed_rad_s), high = std::max(high, point.speed_rad_s);

@@ -41,9 +41,6 @@ struct ThrustLine {
 
 [[nodiscard]] ThrustLine line_through(const std::vector<Point>& points);
 
-/// At most 20,000 of them, from all over the log: enough to judge by.
-[[nodiscard]] std::vector<Point> some_of(const std::vector<Point>& points);
-
 /// Whether thrust falls with ω², is only below 0 at one speed, or does neither.
 enum class ThrustSign : std::uint8_t { rises, falls, cannot_tell };
 [[nodiscard]] ThrustSign sign_of(const std::vector<Point>& points);

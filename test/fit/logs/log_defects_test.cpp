@@ -134,7 +134,8 @@ TEST(SignOfALog, IsNotTakenForReversedWhereItIsUntared) {
 TEST(ZeroOfALog, AtOneSpeedIsUnknown) {
   const Outcome outcome = outcome_of(ramp(0.4, 1, 0.02, 6, 0, 6000, 6060));
   EXPECT_TRUE(outcome.spoilt) << outcome.said;
-  EXPECT_THAT(outcome.said, HasSubstr("zero_unknown: no rows with the motor off, and 6000 to 6060 RPM do not tell"));
+  EXPECT_THAT(outcome.said,
+              HasSubstr("zero_unknown: too few rows with the motor off, or none, and 6000 to 6060 RPM do not tell"));
   const Outcome below = outcome_of(ramp(-3, 1, 0.02, 6, 0, 6000, 6060));
   EXPECT_THAT(below.refused, HasSubstr("thrust does not follow speed²"));
 }
