@@ -100,11 +100,12 @@ class TableReader {
   }
 
   /// Of a block of whole lines.
-  void read(std::string_view lines, const auto& split) {
+  void read(std::string_view lines, const auto& split, std::string_view comment = {}) {
     while (!lines.empty() && !given_up_) {
       ++row_.line;
-      const std::string_view line = next_line(lines);
-      if (!trimmed(line).empty()) take_line(split(line, row_.fields));
+      const std::string_view line = next_line(lines), content = trimmed(line);
+      if (content.empty() || (!comment.empty() && content.starts_with(comment))) continue;
+      take_line(split(line, row_.fields));
     }
   }
 
@@ -166,7 +167,8 @@ std::size_t Table::column(std::string_view name) const {
 
 std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator) {
   Fields fields;
-  return split_separated(line, separator, fields) ? std::optional(std::move(fields)) : std::nullopt;
+  const bool closed = separator == ' ' ? split_blanks(line, fields) : split_separated(line, separator, fields);
+  return closed ? std::optional(std::move(fields)) : std::nullopt;
 }
 
 char likely_separator(std::string_view text) {
@@ -184,10 +186,16 @@ Table read_csv(TextBlocks text, std::string path, char separator, const TakeRow&
       [separator](std::string_view line, Fields& fields) { return split_separated(line, separator, fields); }, take);
 }
 
-Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator, const TakeRow& take) {
+Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator, const TakeRow& take,
+                    std::string_view comment) {
   TableReader reader({begin.path, begin.header_line, begin.header, {}, {}}, line - 1, take);
-  reader.read(block,
-              [separator](std::string_view text, Fields& fields) { return split_separated(text, separator, fields); });
+  if (separator == ' ') {
+    reader.read(block, split_blanks, comment);
+  } else {
+    reader.read(
+        block, [separator](std::string_view text, Fields& fields) { return split_separated(text, separator, fields); },
+        comment);
+  }
   return std::move(reader).table();
 }
 

@@ -41,15 +41,16 @@ struct Table {
 using TakeRow = std::function<void(const Table&, const TableRow&)>;
 [[nodiscard]] Table read_csv(TextBlocks text, std::string path, char separator = ',', const TakeRow& take = {});
 
-/// Rows of a later block of whole lines of a table that is known by `begin`, its header and path; `line`: the number of
-/// the first one. What it returns holds the problems of the block.
+/// Rows of a block of whole lines of a table that is known by `begin`, its header and path; `line`: the number of the
+/// first one. Skips lines that begin with `comment`, if there is one. What it returns holds the problems of the block.
 [[nodiscard]] Table read_csv_rows(const Table& begin, std::string_view block, std::size_t line, char separator,
-                                  const TakeRow& take);
+                                  const TakeRow& take, std::string_view comment = {});
 
 /// , ; or tab: the one that the header line has most of.
 [[nodiscard]] char likely_separator(std::string_view text);
 
-/// The fields of one line of such a table; nullopt if its quotes do not close, or text follows a closing quote.
+/// The fields of one line of such a table, ' ' being any number of blanks and tabs; nullopt if its quotes do not close,
+/// or text follows a closing quote.
 [[nodiscard]] std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator = ',');
 /// Separated by blanks or tabs.
 [[nodiscard]] Table read_blank_separated(TextBlocks text, std::string path);

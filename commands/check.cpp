@@ -18,6 +18,7 @@
 #include "daq/campaign/dry_run.hpp"
 #include "drivers/sim/input_files.hpp"
 #include "fit/export/targets.hpp"
+#include "fit/logs/layout.hpp"
 #include "profiles/answers.hpp"
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
@@ -225,6 +226,8 @@ const std::vector<Kind>& kinds() {
            {"mountings"}),
       ours(FileKind::world, [](Text text, File file) { return lines_of(profiles::parse_world(text, file.path)); },
            {"k_t_n_per_rpm2", "loss_law"}),
+      ours(FileKind::layout, [](Text text, File file) { return fit::describe(fit::parse_layout(text, file.path)); },
+           {"header_line"}),
       {"coefficients", compensation::kCoefficientFormat,
        [](Text, File file) { return lines_of(load_standing_coefficients(file.path)); }},
       {"fault script", "kphi-faults/1",
@@ -343,7 +346,7 @@ ExitCode check(const CheckOptions& options) {
 void add_check(CLI::App& program, ExitCode& exit_code) {
   const auto [command, options] = add_verb<CheckOptions>(
       program, exit_code, "check",
-      "check campaign, bench, vehicle, answers and coefficient files, fault scripts and simulated motors",
+      "check campaign, bench, vehicle, answers, layout and coefficient files, fault scripts and simulated motors",
       "kphi check my_bench.yaml my_campaign.yaml", check);
   add_argument(command, "FILE", options.paths,
                "files; campaigns are also checked against the benches and answers among them");

@@ -52,6 +52,9 @@ ExitCode compare_family(const CompareRequest& request) {
       throw ConfigurationError(
           path + ": not a folder; several propellers are compared from their folders, with steps.csv in them");
     auto [input, fitted] = fitted_again(path);
+    if (fitted.identification.alone())
+      throw ConfigurationError(
+          path + ": a log without occlusions; compare two logs at a time, or put all on one page with kphi report");
     family.push_back(std::move(fitted));
     when.push_back(input.provenance.measured_utc);
   }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "base/csv.hpp"
 #include "base/number.hpp"
@@ -285,10 +286,11 @@ ExitCode run_fit(const FitRequest& request) {
   Fitted fitted{identify_input(input, request), {}};
   const Identification& identification = fitted.identification;
   if (const double K_T = identification.thrust_coefficient().value; !(K_T > 0))
-    throw DataRejected(fmt::format(
-        "{}: K_T is {:.3e} N/(rad/s)^2 and must be positive; mirror thrust_axis in the bench file, or import with "
-        "--reverse-thrust",
-        request.path, K_T));
+    throw DataRejected(
+        fmt::format("{}: K_T is {:.3e} N/(rad/s)^2 and must be positive: thrust does not rise with speed; mirror "
+                    "thrust_axis in the "
+                    "bench file if its sign is reversed",
+                    request.path, K_T));
   // A table that lies in a campaign's folder is not the campaign.
   const bool is_apart = !input.campaign && fs::exists(input.folder / "journal.jsonl");
   const std::string apart = is_apart ? fs::path(request.path).stem().string() + "_" : "";
@@ -353,6 +355,13 @@ ExitCode report_several(const ReportRequest& request) {
     family.push_back(std::move(fitted));
     chapters.push_back({std::move(input.provenance), drawn});
   }
+  const auto alone = std::ranges::count_if(family, [](const Fitted& one) { return one.identification.alone(); });
+  if (std::cmp_equal(alone, family.size())) {
+    write_page(page, format_reports(family, chapters, {}, nullptr));
+    return ExitCode::ok;
+  }
+  if (alone > 0)
+    throw ConfigurationError("logs without occlusions and campaigns do not fit on one page; report them apart");
   std::optional<History> history;
   if (family.size() >= kLeastHistory && of_one_propeller(family)) {
     std::vector<std::string> when;

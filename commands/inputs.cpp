@@ -153,6 +153,14 @@ std::vector<CurvePoint> averaged_table(std::vector<CurvePoint> table, const fs::
   return averaged.points;
 }
 
+/// What `kphi import` found of the steps that a log's speed comes in; 0: nothing.
+double u_speed_of_log(const fs::path& folder) {
+  if (!fs::is_regular_file(folder / "import.json")) return 0;
+  const auto record = nlohmann::json::parse(results::read_text(folder / "import.json"), nullptr, false);
+  if (!record.is_object() || !record.contains("u_speed_share") || !record["u_speed_share"].is_number()) return 0;
+  return record["u_speed_share"];
+}
+
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -163,6 +171,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
     input.table = averaged_table(read_k_table(text, path.string(), unit_of_k), path);
   } else {
     input.steps = results::parse_steps(text, path.string());
+    input.u_speed = u_speed_of_log(input.folder);
     input.provenance.origin = results::origin_of(input.steps);
     // A log does not tell whether anything was mounted anew; a campaign's own table, which its campaign does.
     const fs::path campaign = input.folder / "campaign.yaml";
@@ -194,6 +203,7 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
   AnalysisOptions options;
   if (const auto& air = identification.air) options.bench.air_density = air->u / air->value;
   if (const auto& clock = input.provenance.clock) options.bench.motor_clock = clock->u_gain;
+  if (input.u_speed > 0) options.bench.motor_clock = input.u_speed;
   options.bench.cell_calibration = input.u_calibration;
   options.bench.calibration_note = input.provenance.cell_weighed;
   return options;

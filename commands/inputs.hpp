@@ -32,6 +32,7 @@ struct FitInput {
   std::filesystem::path folder;                     ///< where the outputs go
   bool campaign = false;                            ///< `folder` is a campaign folder
   bool mounted_once = false;                        ///< one mounting for all repetitions of an occlusion
+  double u_speed = 0;                     ///< of a log: relative, of all speeds together, by the steps they come in
   std::optional<double> u_calibration{};  ///< relative, of the load cell, by the weighing in provenance.cell_weighed
 };
 

@@ -1,4 +1,4 @@
-// `kphi list`: the campaigns in a folder, a line each.
+// `kphi list`: the campaigns and imported logs in a folder, a line each.
 #include <algorithm>
 #include <filesystem>
 #include <optional>
@@ -6,6 +6,7 @@
 #include "base/text.hpp"
 #include "commands/campaign_summary.hpp"
 #include "commands/inputs.hpp"
+#include "results/file_layer.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -31,11 +32,33 @@ std::optional<CampaignSummary> campaign_in(const fs::path& folder) {
   }
 }
 
+/// What `kphi import` wrote; nullopt: no such folder.
+std::optional<CampaignSummary> log_in(const fs::path& folder) {
+  if (!fs::is_regular_file(folder / "import.json")) return std::nullopt;
+  CampaignSummary summary;
+  summary.folder = folder.string();
+  const Json record = Json::parse(results::read_text(folder / "import.json"), nullptr, false);
+  if (!record.is_object() || record.value("format", "") != "kphi-import/1") {
+    summary.damage = "import.json is not one of kphi";
+    return summary;
+  }
+  const auto number = [&](const char* key) {
+    return record.contains(key) && record[key].is_number() ? std::optional(record[key].get<double>()) : std::nullopt;
+  };
+  summary.propeller = record.value("propeller", std::string());
+  summary.steps.steps = static_cast<int>(number("rows_used").value_or(0));
+  summary.verdict = record.value("k_means_nothing", false) ? "log, no k" : "log";
+  summary.K_T = number("k_n_s2_per_rad2");
+  if (const auto u = number("k_u_n_s2_per_rad2")) summary.expanded_95 = 2 * *u;
+  summary.finished = true;
+  return summary;
+}
+
 std::vector<CampaignSummary> campaigns_in(const std::string& folder) {
   std::vector<CampaignSummary> found;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     if (std::error_code none; entry.is_directory(none))
-      if (auto campaign = campaign_in(entry.path())) found.push_back(std::move(*campaign));
+      if (auto one = campaign_in(entry.path()); one || (one = log_in(entry.path()))) found.push_back(std::move(*one));
   std::ranges::sort(found, {}, [](const CampaignSummary& one) { return std::pair(one.started_utc, one.folder); });
   return found;
 }
@@ -69,7 +92,7 @@ ExitCode list(const ListRequest& request) {
     for (const CampaignSummary& one : campaigns) all.push_back(to_json(one));
     print_json(all);
   } else if (campaigns.empty()) {
-    fmt::print(stderr, "kphi: {}: no campaigns; `kphi run` makes them\n", request.folder);
+    fmt::print(stderr, "kphi: {}: no campaigns and no logs; `kphi run` and `kphi import` make them\n", request.folder);
   } else {
     print_table(campaigns);
   }
@@ -79,9 +102,9 @@ ExitCode list(const ListRequest& request) {
 }  // namespace
 
 void add_list(CLI::App& program, ExitCode& exit_code) {
-  const auto [command, request] =
-      add_verb<ListRequest>(program, exit_code, "list", "list campaigns: date, propeller, K_T, verdict",
-                            "kphi list\nkphi list results --json", list);
+  const auto [command, request] = add_verb<ListRequest>(
+      program, exit_code, "list", "list campaigns and imported logs: date, propeller, K_T, verdict",
+      "kphi list\nkphi list results --json", list);
   command.add_option("DIR", request.folder, "folder that holds campaigns' folders")
       ->type_name("")
       ->capture_default_str();

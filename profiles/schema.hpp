@@ -1,4 +1,4 @@
-// The JSON Schemas of the four kinds of files, and what they find in a document, in words for its author.
+// The JSON Schemas of the kinds of files, and what they find in a document, in words for its author.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace kphi::profiles {
 
-enum class FileKind { campaign, bench, vehicle, answers, world };
+enum class FileKind { campaign, bench, vehicle, answers, world, layout };
 
 struct FileKindInfo {
   FileKind kind;
@@ -18,12 +18,13 @@ struct FileKindInfo {
   const char* format;  ///< value of the key `format`
 };
 
-inline constexpr std::array<FileKindInfo, 5> kFileKinds{{
+inline constexpr std::array<FileKindInfo, 6> kFileKinds{{
     {FileKind::campaign, "campaign", "kphi-campaign/1"},
     {FileKind::bench, "bench", "kphi-bench/1"},
     {FileKind::vehicle, "vehicle", "kphi-vehicle/1"},
     {FileKind::answers, "answers", "kphi-answers/1"},
     {FileKind::world, "world", "kphi-world/1"},
+    {FileKind::layout, "layout", "kphi-layout/1"},
 }};
 
 [[nodiscard]] constexpr const FileKindInfo& info(FileKind kind) { return kFileKinds[static_cast<std::size_t>(kind)]; }

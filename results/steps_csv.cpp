@@ -25,7 +25,7 @@ using Field = std::variant<std::string StepMean::*, int StepMean::*, std::uint64
 struct StepColumn {
   const char* name;
   Field field;
-  int group = 0;  ///< columns of a group but 0 are written if a step has a value for the first of them
+  int group = 0;  ///< columns of a group but 0 are written if a step has a value for one of them
 };
 
 const std::array kColumns{
@@ -70,16 +70,15 @@ constexpr std::string_view kZeroColumn = "zero_n";
 
 using Columns = std::vector<StepColumn>;
 
-/// For each group whether one of the steps has a value for its first column.
+/// For each group whether one of the steps has a value for one of its columns.
 using Groups = std::array<bool, 6>;
 constexpr Groups kNoGroups{true};  // but the one of the columns that all have
 
 void take_groups(const StepMean& step, Groups& groups) {
-  int group = 0;
   for (const StepColumn& column : kColumns) {
-    if (column.group == group) continue;
-    group = column.group;
-    groups[static_cast<std::size_t>(group)] |= !std::isnan(step.*std::get<double StepMean::*>(column.field));
+    bool& has = groups[static_cast<std::size_t>(column.group)];
+    if (column.group == 0 || has) continue;
+    if (const auto* field = std::get_if<double StepMean::*>(&column.field)) has = !std::isnan(step.**field);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include "base/number.hpp"
 #include "base/text.hpp"
 #include "compensation/units.hpp"
+#include "fit/logs/row_groups.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/model/thrust_fit.hpp"
 
@@ -61,20 +63,43 @@ bool is_uiuc(std::string_view text) {
   return header.find_column("RPM") && header.find_column("CT");
 }
 
-Import import_log(StandLog log, const RowSelection& selection) {
+Import import_log(RowGroup group, RowSelection selection) {
   Import import;
+  StandLog& log = group.log;
   import.findings = audit(log, selection);
+  import.layout = log.layout;
+  import.group = group.name;
   for (const LogFinding& finding : import.findings) {
     if (finding.kind == FindingKind::speed_ratio && !selection.speed)
       throw FitError(fmt::format("{}: {}", log.path, finding.text));
   }
+  const LogRest rest = rest_of(log, choose_speed(log, selection));
   import.table = select_rows(std::move(log), selection);
   flag_steps(import.table, import.findings);
+  if (std::ranges::any_of(import.findings, spoils_k, &LogFinding::kind)) return import;
+  const std::vector<bool> left_out = import.table.left_out;
+  leave_out_obvious(import.table);
+  const ZeroOfLog zero = zero_of(rest, import.table, selection);
+  for (LogFinding& finding : findings_of(zero, import.table)) import.findings.push_back(std::move(finding));
+  import.table.left_out = left_out;  // what else goes shows now that the zero is known
+  import.table.zero_u_n = zero.u_n;
+  import.table.tare_n = zero.zero_n;
+  for (LogFinding& finding : audit_rows(import.table)) import.findings.push_back(std::move(finding));
   return import;
 }
 
+/// What is turned is audited after turning.
+std::vector<Import> import_logs(StandLog log, RowSelection selection) {
+  if (std::exchange(selection.reverse_thrust, false)) turn_thrust(log);
+  RowGroups groups = split_groups(std::move(log), selection);
+  std::vector<Import> imports;
+  for (RowGroup& group : groups.groups) imports.push_back(import_log(std::move(group), selection));
+  imports.front().findings.insert(imports.front().findings.begin(), groups.findings.begin(), groups.findings.end());
+  return imports;
+}
+
 Import import_uiuc(TextBlocks text, const std::string& path, const ImportOptions& options) {
-  Import import{read_uiuc(std::move(text), path, options.diameter_in, options.air_density_kg_m3), {}};
+  Import import{read_uiuc(std::move(text), path, options.diameter_in, options.air_density_kg_m3), {}, {}};
   for (const TableProblem& problem : import.table.problems)
     import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, { problem.line }});
   return import;
@@ -114,7 +139,7 @@ ImportedTable read_uiuc(TextBlocks text, std::string path, std::optional<double>
       continue;
     }
     const double turns_per_s = *rpm / 60, diameter = *diameter_in * kMetresPerInch;
-    imported.rows.push_back({.line = row.line,
+    imported.rows.push_back({.line = static_cast<std::uint32_t>(row.line),
                              .optical_rpm = *rpm,
                              .thrust_n = *ct * density_kg_m3 * turns_per_s * turns_per_s * std::pow(diameter, 4)});
   }
@@ -147,35 +172,59 @@ std::vector<CurvePoint> read_k_table(std::string_view text, std::string path, st
   return points;
 }
 
-Import import_table(TextBlocks text, const std::string& path, const ImportOptions& options) {
-  const std::string_view begin = text.front();
-  if (begin.starts_with("\xFF\xFE") || begin.starts_with("\xFE\xFF"))
-    throw ConfigurationError(path + ":1: UTF-16; convert it first: iconv -f UTF-16 -t UTF-8 LOG.csv > NEW.csv");
-  Import import = !options.columns.empty()
-                      ? import_log(read_columns(std::move(text), path, options.columns, options.dialect), options.rows)
-                  : is_uiuc(begin) ? import_uiuc(std::move(text), path, options)
-                                   : import_log(read_rcbenchmark(std::move(text), path, options.dialect), options.rows);
-  if (!options.propeller.empty()) import.table.propeller = options.propeller;
-  if (options.diameter_in) import.table.diameter_in = *options.diameter_in;
-  import.table.blades = options.blades;
-  return import;
+std::vector<Import> import_groups(TextBlocks text, const std::string& path, const ImportOptions& options) {
+  std::vector<Import> imports;
+  if (options.layout) {
+    imports = import_logs(read_log(std::move(text), path, *options.layout), options.rows);
+  } else if (is_uiuc(text.front())) {
+    imports.push_back(import_uiuc(std::move(text), path, options));
+  } else {
+    imports = import_logs(read_log(std::move(text), path, options.hints), options.rows);
+  }
+  for (Import& import : imports) {
+    if (!options.propeller.empty()) import.table.propeller = options.propeller;
+    if (!import.group.empty()) import.table.propeller += ", " + import.group;
+    if (options.diameter_in) import.table.diameter_in = *options.diameter_in;
+    import.table.blades = options.blades;
+  }
+  return imports;
 }
 
-std::string summary_of(const ImportedTable& imported, const ThrustFit& fit) {
+Import import_table(TextBlocks text, const std::string& path, const ImportOptions& options) {
+  std::vector<Import> imports = import_groups(std::move(text), path, options);
+  if (imports.size() == 1) return std::move(imports.front());
+  throw FitError(fmt::format("{}: {}", path, imports.front().findings.front().text));
+}
+
+std::string summary_of(const ImportedTable& imported, const std::vector<OcclusionFit>& fits) {
   std::string text = fmt::format("{} of {} rows, thrust in {}, {} speed", imported.size(), imported.rows_total,
                                  imported.unit, imported.speed_source);
   if (imported.tare_n != 0) text += fmt::format(", tare {:.4f} N", imported.tare_n);
-  return text + fmt::format(", k = {} N/(rad/s)^2, rms {:.4f} N", with_error(fit.parameters.k, fit.standard_error.k),
-                            fit.rms_n);
+  for (const OcclusionFit& one : fits) {
+    text += fmt::format(", k{} = {} N/(rad/s)^2, rms {:.4f} N",
+                        fits.size() == 1 ? "" : fmt::format("({:g}°)", one.occlusion_deg),
+                        with_error(one.fit.parameters.k, one.u_k), one.fit.rms_n);
+  }
+  return text;
 }
 
-std::string import_record(const Import& import, const ThrustFit& fit, const std::string& sha256,
+bool spoilt(const Import& import, const JudgedFit& judged) {
+  return std::ranges::any_of(import.findings, spoils_k, &LogFinding::kind) ||
+         std::ranges::any_of(judged.findings, spoils_k, &LogFinding::kind);
+}
+
+std::string import_record(const Import& import, const JudgedFit& judged, const std::string& sha256,
                           const std::string& path, const ImportOptions& options, const std::string& tool_version) {
   Json findings = Json::array();
-  for (const LogFinding& finding : import.findings) {
-    Json& one = findings.emplace_back(Json{{"kind", name_of(finding.kind)}});
-    KPHI_JSON_MEMBERS(one, finding, rows, first_line, text, lines);
+  for (const auto* list : {&import.findings, &judged.findings}) {
+    for (const LogFinding& finding : *list) {
+      Json& one = findings.emplace_back(Json{{"kind", name_of(finding.kind)}});
+      KPHI_JSON_MEMBERS(one, finding, rows, first_line, text, lines);
+    }
   }
+  const ThrustFit& fit = judged.fits.front().fit;
+  const bool pooled = judged.fits.size() == 1;
+  const auto of_one = [&](double value) { return pooled ? Json(value) : Json(); };
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)
     problems.push_back({{"line", problem.line}, {"what", problem.what}});
@@ -185,14 +234,21 @@ std::string import_record(const Import& import, const ThrustFit& fit, const std:
               {"tool_version", tool_version},
               {"thrust_unit", import.table.unit},
               {"rows_used", import.table.size()},
-              {"k_n_s2_per_rad2", fit.parameters.k},
-              {"k_standard_error_n_s2_per_rad2", fit.standard_error.k},
-              {"rms_n", fit.rms_n},
+              {"k_n_s2_per_rad2", of_one(fit.parameters.k)},
+              {"k_standard_error_n_s2_per_rad2", of_one(fit.standard_error.k)},
+              {"k_u_n_s2_per_rad2", of_one(judged.fits.front().u_k)},
+              {"rms_n", of_one(fit.rms_n)},
+              {"u_speed_share", judged.u_speed},
+              {"propeller", import.table.propeller},
+              {"k_means_nothing", spoilt(import, judged)},
+              {"throttle_laws", judged.throttle},
               {"columns_left_out", import.table.unread},
               {"findings", findings},
               {"lines_left_out", problems}};
   KPHI_JSON_MEMBERS(record, import.table, speed_source, tare_n, rows_total);
-  KPHI_JSON_MEMBERS(record, options.rows, speed_factor, reverse_thrust);
+  KPHI_JSON_MEMBERS(record, import.table, reverse_thrust);
+  KPHI_JSON_MEMBERS(record, options.rows, speed_factor);
+  if (!import.group.empty()) record["group"] = import.group;
   return record.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "fit/logs/k_audit.hpp"
 #include "fit/logs/log_audit.hpp"
 #include "fit/model/curve_fit.hpp"
 
@@ -37,8 +38,8 @@ inline constexpr double kUiucDensityKgM3 = 1.225;
 
 struct ImportOptions {
   RowSelection rows;
-  std::vector<ColumnRole> columns;  ///< given: a table of any make
-  CsvDialect dialect;               ///< of such a table
+  LayoutHints hints;
+  std::optional<Layout> layout{};  ///< known, not to be found
   std::optional<double> diameter_in{};
   double air_density_kg_m3 = kUiucDensityKgM3;  ///< of a UIUC table
   std::string propeller;                        ///< default: the file's name without ending
@@ -48,17 +49,26 @@ struct ImportOptions {
 struct Import {
   ImportedTable table;
   std::vector<LogFinding> findings;
+  std::optional<Layout> layout{};  ///< not of a UIUC table
+  std::string group{};             ///< "5x3, reverse"; empty: the only one
 };
 
-/// As the columns say, or UIUC when the header's columns are RPM and CT, else RCbenchmark. Two speeds at a ratio other
-/// than 1 need a decision: without `rows.speed` such a table throws FitError. Throws ConfigurationError (path:line).
+/// UIUC when the header's columns are RPM and CT, else a table of any make; one import for each of its groups of rows.
+/// Two speeds at a ratio other than 1 need a decision: without `rows.speed` such a table throws FitError. Throws
+/// ConfigurationError (path:line).
+[[nodiscard]] std::vector<Import> import_groups(TextBlocks text, const std::string& path, const ImportOptions& options);
+/// Of a table with one group; throws FitError for several.
 [[nodiscard]] Import import_table(TextBlocks text, const std::string& path, const ImportOptions& options);
 
-/// "10 of 11 rows, thrust in gf, electrical speed, k = 1.1107e-06 ± 1.0e-08 N/(rad/s)^2, rms 0.0453 N"
-[[nodiscard]] std::string summary_of(const ImportedTable& imported, const ThrustFit& fit);
+/// "10 of 11 rows, thrust in gf, electrical speed, k = 1.1107e-06 ± 1.0e-08 N/(rad/s)^2, rms 0.0453 N"; k of each
+/// occlusion.
+[[nodiscard]] std::string summary_of(const ImportedTable& imported, const std::vector<OcclusionFit>& fits);
+
+/// One k for the table means nothing.
+[[nodiscard]] bool spoilt(const Import& import, const JudgedFit& judged);
 
 /// import.json: the source with its hash, what was asked, what was taken, and every finding.
-[[nodiscard]] std::string import_record(const Import& import, const ThrustFit& fit, const std::string& sha256,
+[[nodiscard]] std::string import_record(const Import& import, const JudgedFit& judged, const std::string& sha256,
                                         const std::string& path, const ImportOptions& options,
                                         const std::string& tool_version);
 

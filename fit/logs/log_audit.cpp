@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
+#include "fit/logs/thrust_slope.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -17,17 +19,20 @@ using results::QualityFlag;
 using Findings = std::vector<LogFinding>;
 using Rows = std::vector<const StandRow*>;
 
-constexpr std::array kNames{"speed_ratio",    "speed_disagrees",   "speed_dead",    "speed_spike",     "speed_missing",
-                            "barely_turning", "not_turning",       "coasting",      "current_limit",   "untared",
-                            "zero_missing",   "zero_drifted",      "zero_scatters", "negative_thrust", "thrust_frozen",
-                            "thrust_drifts",  "correlated_noise",  "time_backward", "time_repeated",   "not_a_number",
-                            "other_fields",   "k_unlike_its_group"};
-static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::k_unlike_its_group) + 1);
+constexpr std::array kNames{
+    "speed_ratio",    "speed_disagrees",    "speed_dead",    "speed_spike",     "speed_missing",
+    "barely_turning", "not_turning",        "coasting",      "current_limit",   "untared",
+    "zero_missing",   "zero_drifted",       "zero_scatters", "negative_thrust", "thrust_frozen",
+    "thrust_drifts",  "correlated_noise",   "time_backward", "time_repeated",   "not_a_number",
+    "other_fields",   "k_unlike_its_group", "speed_frozen",  "speed_doubled",   "row_unlike",
+    "speed_stepped",  "zero_fitted",        "zero_unknown",  "several_groups",  "one_k_misfits"};
+static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::one_k_misfits) + 1);
 
 /// Of the steps concerned.
 QualityFlag flag_of(FindingKind kind) {
   using enum FindingKind;
   if (kind == speed_disagrees || kind == speed_dead || kind == speed_spike) return QualityFlag::speed_unsteady;
+  if (kind == speed_frozen) return QualityFlag::frozen;
   if (kind == current_limit) return QualityFlag::supply_out_of_band;
   return kind == thrust_frozen ? QualityFlag::bad_status : QualityFlag::none;
 }
@@ -61,6 +66,20 @@ bool both_turn(const StandRow& row) {
   return row.electrical_rpm.value_or(0) > kTurningRpm && row.optical_rpm.value_or(0) > kTurningRpm;
 }
 
+/// optical/electrical of the rows in which both turn and neither stands still while the other changes.
+std::vector<double> live_ratios(const StandLog& log) {
+  std::vector<double> ratios;
+  const StandRow* before = nullptr;
+  for (const StandRow& row : log.rows) {
+    const StandRow* const last = std::exchange(before, &row);
+    if (!both_turn(row)) continue;
+    const bool same_e = last != nullptr && last->electrical_rpm == *row.electrical_rpm,
+               same_o = last != nullptr && last->optical_rpm == *row.optical_rpm;
+    if (same_e == same_o) ratios.push_back(*row.optical_rpm / *row.electrical_rpm);
+  }
+  return ratios;
+}
+
 void judge_ratio(double ratio, std::size_t rows, Findings& findings) {
   if (std::abs(ratio - 1) < 0.01) return;
   std::string text = fmt::format(
@@ -78,8 +97,7 @@ void judge_ratio(double ratio, std::size_t rows, Findings& findings) {
 }
 
 void audit_two_speeds(const StandLog& log, Findings& findings) {
-  std::vector<double> ratios, off;
-  for (const StandRow* row : rows_where(log, both_turn)) ratios.push_back(*row->optical_rpm / *row->electrical_rpm);
+  std::vector<double> ratios = live_ratios(log), off;
   if (ratios.size() < 3) return;
   const double ratio = upper_median(ratios);
   judge_ratio(ratio, ratios.size(), findings);
@@ -175,42 +193,18 @@ void audit_current_limit(const StandLog& log, SpeedSource source, Findings& find
 
 // ---- zero --------------------------------------------------------------------------------------------------
 
-/// Rows with the motor off at one end of the log.
-struct LogZero {
-  double mean_n = 0;
-  double sd_n = 0;
-  std::size_t rows = 0;
-
-  [[nodiscard]] std::string words(const char* when) const {
-    return fmt::format("{:.3f} N {} ({} rows, sd {:.3f} N)", mean_n, when, rows, sd_n);
-  }
-};
-
-/// Up to the first row that turns; nullopt with fewer than 10 rows.
-template <class Iterator>
-std::optional<LogZero> leading_zero(Iterator begin, Iterator end, SpeedSource source) {
-  constexpr std::size_t kRowsForAZero = 10;
-  std::vector<double> values;
-  for (; begin != end && !(rpm_of(*begin, source).value_or(0) > 0); ++begin)
-    if (motor_off(*begin, source)) values.push_back(begin->thrust_n);
-  if (values.size() < kRowsForAZero) return std::nullopt;
-  return LogZero{mean(values), std::sqrt(variance(values)), values.size()};
-}
-
 /// `tare_n` is what the import subtracts.
-void audit_zero(const StandLog& log, const std::optional<LogZero>& before, const std::optional<LogZero>& after,
+void audit_zero(const StandLog& log, const std::optional<RestRows>& before, const std::optional<RestRows>& after,
                 double tare_n, Findings& findings) {
-  constexpr std::size_t kRowsOfASeries = 50;  // a table of averaged steps was tared by its program
   const double largest = largest_thrust(log);
-  if (before && before->sd_n > kTareScatterMax * largest) {
+  if (before && before->scatters(largest)) {
     add(findings, FindingKind::zero_scatters, before->rows, 0,
         "with the motor off the stand reads " + before->words("before") + ": too noisy for a zero");
-  } else if (before && tare_n == 0 && std::abs(before->mean_n) > std::max(5e-3 * largest, 3 * before->sd_n)) {
+  } else if (before && tare_n == 0 && std::abs(before->mean_n) > std::max(5e-3 * largest, 3 * before->u_mean())) {
     add(findings, FindingKind::untared, before->rows, 0,
-        fmt::format("with the motor off the stand reads {}, {:.1f} % of the largest thrust: never tared; import "
-                    "with --tare-rows {}",
-                    before->words("before"), 100 * std::abs(before->mean_n) / largest,
-                    std::min<std::size_t>(before->rows, 100)));
+        fmt::format("with the motor off the stand reads {}, {:.1f} % of the largest thrust: never tared; what it reads "
+                    "with the motor off is subtracted",
+                    before->words("before"), 100 * std::abs(before->mean_n) / largest));
   }
   const double drift = before && after ? after->mean_n - before->mean_n : 0;
   if (before && after && std::abs(drift) > std::max(1e-3 * largest, 5 * std::hypot(before->sd_n, after->sd_n))) {
@@ -219,7 +213,7 @@ void audit_zero(const StandLog& log, const std::optional<LogZero>& before, const
   }
   if (!before && log.rows.size() >= kRowsOfASeries) {
     add(findings, FindingKind::zero_missing, log.rows.size(), 0,
-        "no rows with the motor off at the beginning: the zero is unknown, and k may be off by a few percent");
+        "no rows with the motor off at the beginning tell the zero");
   }
   const double noise = std::max(5e-3 * largest, before ? 3 * before->sd_n : 0);
   double lowest = 0;
@@ -253,8 +247,28 @@ void audit_time(const StandLog& log, Findings& findings) {
   add(findings, FindingKind::time_repeated, repeated, "time stamps occur twice");
 }
 
+constexpr std::size_t kFrozenRows = 20;
+
+/// The same speed above 0 row after row while the thrust changes by a tenth of the largest and more.
+void audit_frozen_speed(const StandLog& log, SpeedSource source, Findings& findings) {
+  constexpr double kChanges = 0.1;
+  const double largest = largest_thrust(log);
+  const auto rpm = [&](std::size_t i) { return rpm_of(log.rows[i], source).value_or(0); };
+  Rows frozen;
+  for (std::size_t begin = 0, end = 0; begin < log.rows.size(); begin = end) {
+    double low = log.rows[begin].thrust_n, high = low;
+    for (; end < log.rows.size() && rpm(end) == rpm(begin); ++end)
+      low = std::min(low, log.rows[end].thrust_n), high = std::max(high, log.rows[end].thrust_n);
+    if (end - begin < kFrozenRows || rpm(begin) <= 0 || high - low < kChanges * largest ||
+        end - begin == log.rows.size())
+      continue;
+    for (std::size_t i = begin; i < end; ++i) frozen.push_back(&log.rows[i]);
+  }
+  add(findings, FindingKind::speed_frozen, frozen,
+      "the same speed row after row while the thrust changes: the channel is frozen; rows left out");
+}
+
 void audit_frozen(const StandLog& log, Findings& findings) {
-  constexpr std::size_t kFrozenRows = 20;
   Rows frozen;
   for (std::size_t begin = 0, end = 0; begin < log.rows.size(); begin = end) {
     while (end < log.rows.size() && log.rows[end].thrust_n == log.rows[begin].thrust_n) ++end;
@@ -336,7 +350,10 @@ void audit_noise(const StandLog& log, SpeedSource source, const std::vector<std:
 
 const char* name_of(FindingKind kind) { return kNames[static_cast<std::size_t>(kind)]; }
 
-bool spoils_k(FindingKind kind) { return kind == FindingKind::thrust_drifts; }
+bool spoils_k(FindingKind kind) {
+  using enum FindingKind;
+  return kind == thrust_drifts || kind == zero_unknown || kind == one_k_misfits;
+}
 
 std::optional<PoleRatio> pole_ratio(double ratio) {
   constexpr int kMost = 24;
@@ -370,8 +387,7 @@ double correlation_time(const std::vector<double>& values) {
 
 std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection) {
   const SpeedSource source = choose_speed(log, selection);
-  const auto before = leading_zero(log.rows.begin(), log.rows.end(), source);
-  const auto after = leading_zero(log.rows.rbegin(), log.rows.rend(), source);
+  const auto before = rest_before(log, source), after = rest_after(log, source);
   const double zero_n = before ? before->mean_n : 0;
   Findings findings;
   audit_two_speeds(log, findings);
@@ -381,6 +397,7 @@ std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection
   audit_zero(log, before, after, selection.tare_rows > 0 ? zero_n : 0, findings);
   audit_time(log, findings);
   audit_frozen(log, findings);
+  audit_frozen_speed(log, source, findings);
   if (const std::vector<std::size_t> rows = plateau(log, source); !rows.empty()) {
     audit_drift(log, source, rows, findings);
     audit_noise(log, source, rows, findings);
@@ -403,8 +420,13 @@ void flag_steps(ImportedTable& table, const std::vector<LogFinding>& findings) {
     if (flag == 0) continue;
     std::vector<std::size_t> lines = finding.lines;
     std::ranges::sort(lines);
-    for (std::size_t i = 0; i < table.size(); ++i)
-      if (std::ranges::binary_search(lines, table.rows[i].line)) table.quality_flags[i] |= flag;
+    const bool out = finding.kind == FindingKind::speed_frozen;
+    if (out) table.left_out.resize(table.size());
+    for (std::size_t i = 0; i < table.size(); ++i) {
+      if (!std::ranges::binary_search(lines, table.rows[i].line)) continue;
+      table.quality_flags[i] |= flag;
+      if (out) table.left_out[i] = true;
+    }
   }
 }
 

@@ -35,6 +35,14 @@ enum class FindingKind : std::uint8_t {
   not_a_number,        ///< fields of a channel that contain something else
   other_fields,        ///< lines that do not fit the header
   k_unlike_its_group,  ///< among files of one propeller
+  speed_frozen,        ///< the same speed many times while the thrust changes
+  speed_doubled,       ///< twice or half of what the thrust needs
+  row_unlike,          ///< among few rows, far from the curve of all others
+  speed_stepped,       ///< a counter of few pulses
+  zero_fitted,         ///< never tared, and no rows with the motor off: the offset of thrust over ω² is taken
+  zero_unknown,        ///< no such rows, and speeds too alike to tell
+  several_groups,      ///< rows of several things, fitted apart
+  one_k_misfits,       ///< one k does not describe the rows
 };
 
 /// "speed_ratio"

@@ -9,6 +9,7 @@
 #include "base/error.hpp"
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
+#include "fit/logs/thrust_slope.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -63,10 +64,7 @@ double ImportedTable::speed_rad_s(std::size_t row) const {
   return from_rpm(*(rows[row].*speed) * speed_factor).value();
 }
 
-double ImportedTable::thrust_n(std::size_t row) const {
-  const double thrust = rows[row].thrust_n - tare_n;
-  return reverse_thrust ? -thrust : thrust;
-}
+double ImportedTable::thrust_n(std::size_t row) const { return rows[row].thrust_n - tare_n; }
 
 results::StepMean ImportedTable::step(std::size_t index) const {
   const StandRow& row = rows[index];
@@ -82,7 +80,8 @@ results::StepMean ImportedTable::step(std::size_t index) const {
   step.speed_n = step.thrust_samples = 1;
   step.speed_sd_rad_s = step.thrust_sd_n = step.torque_sd_nm = kNotMeasured;
   step.torque_nm = row.torque_nm.value_or(kNotMeasured);
-  step.zero_n = reverse_thrust ? -tare_n : tare_n;
+  step.zero_n = tare_n;
+  step.zero_u_n = zero_u_n;
   step.supply_voltage_v = row.voltage_v.value_or(kNotMeasured);
   step.supply_current_a = row.current_a.value_or(kNotMeasured);
   step.motor_current_a = step.coil_temperature_degc = kNotMeasured;
@@ -98,6 +97,18 @@ std::vector<Point> points_of(const ImportedTable& imported) {
   return points;
 }
 
+std::vector<Point> some_points(const ImportedTable& imported) {
+  constexpr std::size_t kEnough = 20'000;
+  const std::size_t count = std::min(imported.size(), kEnough);
+  std::vector<Point> points;
+  points.reserve(count);
+  for (std::size_t n = 0; n < count; ++n) {
+    const std::size_t i = n * imported.size() / count;
+    if (!imported.is_left_out(i)) points.push_back({imported.speed_rad_s(i), imported.thrust_n(i)});
+  }
+  return points;
+}
+
 SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
   const bool electrical_turns =
       std::ranges::any_of(log.rows, [](const StandRow& row) { return row.electrical_rpm.value_or(0) > 0; });
@@ -110,13 +121,19 @@ SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
   return source;
 }
 
+void turn_thrust(StandLog& log) {
+  for (StandRow& row : log.rows) row.thrust_n = -row.thrust_n;
+  log.turned = !log.turned;
+}
+
 ImportedTable select_rows(StandLog log, const RowSelection& selection) {
+  if (selection.reverse_thrust) turn_thrust(log);
   const SpeedSource source = choose_speed(log, selection);
   ImportedTable imported;
   imported.speed = source == SpeedSource::electrical ? &StandRow::electrical_rpm : &StandRow::optical_rpm;
   imported.speed_factor = selection.speed_factor;
   imported.tare_n = tare_of(log, selection, source);
-  imported.reverse_thrust = selection.reverse_thrust;
+  imported.reverse_thrust = log.turned;
   imported.propeller = std::filesystem::path(log.path).stem().string();
   imported.unit = log.thrust_unit;
   imported.speed_source = source == SpeedSource::electrical ? "electrical" : "optical";
@@ -140,10 +157,15 @@ ImportedTable select_rows(StandLog log, const RowSelection& selection) {
 }
 
 void refuse_reversed_thrust(const ImportedTable& imported, const std::string& path) {
-  double sum = 0;
-  for (std::size_t i = 0; i < imported.size(); ++i)
-    sum += imported.thrust_n(i) * imported.speed_rad_s(i) * imported.speed_rad_s(i);
-  if (sum < 0) refuse(path, "thrust falls with speed: its sign is reversed; import with --reverse-thrust");
+  const ThrustSign sign = sign_of(some_points(imported));
+  const bool turned = imported.reverse_thrust;
+  if (sign == ThrustSign::falls)
+    refuse(path, turned ? "thrust falls with speed once it is turned: leave --reverse-thrust out"
+                        : "thrust falls with speed: its sign is reversed; import with --reverse-thrust");
+  if (sign == ThrustSign::cannot_tell)
+    throw FitError(path +
+                   ": thrust does not follow speed², so neither its sign nor its zero is known; log it again with the "
+                   "motor off at the beginning, and with several speeds");
 }
 
 }  // namespace kphi::fit

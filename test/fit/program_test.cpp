@@ -1,4 +1,5 @@
 // kphi fit, report, compare, export and import as a person types them, and types them wrong.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +11,7 @@
 #include <sstream>
 #include <tuple>
 
+#include "compensation/units.hpp"
 #include "fit/model/step_selection.hpp"
 #include "fit/model/thrust_fit.hpp"
 #include "results/file_layer.hpp"
@@ -420,6 +422,46 @@ TEST_F(FitProgram, FitsATableThatCannotFlyAsFarAsItGoes) {
   const Answer without = kphi({"fit", file("without.csv", "phi_deg,k_n_s2_per_rad2\n90,1.2e-6\n180,8e-7\n")});
   EXPECT_EQ(without.code, 5);
   EXPECT_THAT(without.out, AllOf(HasSubstr("it has no k at phi_deg 0"), Not(HasSubstr("slope      -4.44444e-09 ±"))));
+}
+
+/// Thirty logs of one stand that kphi has not seen: a title, German names, semicolons, decimal commas, thousands.
+TEST_F(FitProgram, ReadsAFolderOfThirtyLogsOfOneKind) {
+  std::vector<std::string> logs;
+  for (int i = 0; i < 30; ++i) {
+    std::string text = fmt::format("Schubmessung Nr. {}\r\n\r\nZeit [s];Gas [%];Drehzahl [1/min];Schub [g]\r\n", i + 1);
+    for (int step = 0; step < 14; ++step) {
+      const double rpm = 3200 + 900 * step, omega = rpm * kRadPerSecPerRpm;
+      const double grams = (1 + 0.002 * (i % 5)) * 1.3e-6 * omega * omega / 9.80665e-3;
+      const std::string speed = fmt::format("{:.0f}", rpm), thrust = fmt::format("{:.1f}", grams);
+      text += fmt::format("{},0;{};{}.{};{},{}\r\n", 3 * step, 6 * step + 10, speed.substr(0, speed.size() - 3),
+                          speed.substr(speed.size() - 3), thrust.substr(0, thrust.size() - 2), thrust.back());
+    }
+    logs.push_back(file(fmt::format("messung{:02}.csv", i + 1), text));
+  }
+  const std::string tables = (folder_ / "tables").string(), layout = (folder_ / "stand.yaml").string();
+  const Answer one = kphi({"import", logs.front(), "--out", tables, "--layout", layout});
+  ASSERT_EQ(one.code, 0) << one.err;
+  EXPECT_THAT(one.err, AllOf(HasSubstr("names in line 3, rows from line 4"),
+                             HasSubstr("4, separated by semicolon; numbers such as 1.234,5"),
+                             HasSubstr("column 4 \"Schub [g]\" in g"), HasSubstr("written to " + layout),
+                             HasSubstr("next: kphi fit '" + tables + "/messung01'")));
+  EXPECT_EQ(kphi({"check", layout}).code, 0);
+  std::vector<std::string> all{"import", "--out", tables, "--layout", layout, "--same-propeller"};
+  all.insert(all.end(), logs.begin(), logs.end());
+  const Answer imported = kphi(all);
+  ASSERT_EQ(imported.code, 0) << imported.err;
+  EXPECT_THAT(imported.err, HasSubstr("next: kphi report " + tables + "/*/ --out " + tables + "/report.html"));
+  const Answer listed = kphi({"list", tables});
+  EXPECT_EQ(std::ranges::count(listed.out, '\n'), 31) << listed.out;
+  EXPECT_THAT(listed.out, HasSubstr("messung30"));
+  EXPECT_EQ(kphi({"fit", tables + "/messung01"}).code, 0);
+  std::vector<std::string> page{"report", "--out", (folder_ / "all.html").string()};
+  for (int i = 0; i < 30; ++i) page.push_back(fmt::format("{}/messung{:02}", tables, i + 1));
+  const Answer report = kphi(page);
+  EXPECT_EQ(report.code, 0) << report.err;
+  const Answer compared = kphi({"compare", tables + "/messung01", tables + "/messung05"});
+  EXPECT_EQ(compared.code, 0) << compared.err;
+  EXPECT_THAT(compared.out, HasSubstr("K_T"));
 }
 
 }  // namespace program_test

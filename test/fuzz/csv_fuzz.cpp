@@ -26,17 +26,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace kphi::fit;
   if (size == 0) return 0;
   const std::string_view text(reinterpret_cast<const char*>(data + 1), size - 1);
-  const CsvDialect dialect{data[0] % 4 == 0 ? ';' : data[0] % 4 == 1 ? '\t' : '\0', data[0] % 8 >= 4};
-  accept_or_refuse([&] { return audit(read_rcbenchmark(text, "log.csv"), {}); });
+  const LayoutHints hints{{{Role::thrust, "T", "N"}, {Role::speed, "n", "RPM"}, {Role::electrical_speed, "e", "RPM"}},
+                          data[0] % 4 == 0   ? ';'
+                          : data[0] % 4 == 1 ? '\t'
+                                             : '\0',
+                          data[0] % 8 >= 4 ? std::optional(',') : std::nullopt};
+  accept_or_refuse([&] { return audit(read_log(text, "log.csv"), {}); });
   accept_or_refuse([&] { return import_table(text, "apc_5x4_static.txt", {}); });
   accept_or_refuse([&] {
     ImportOptions options;
-    options.columns = {
-        {kThrust, "T", "N"}, {&StandRow::optical_rpm, "n", "RPM"}, {&StandRow::electrical_rpm, "e", "RPM"}};
-    options.dialect = dialect;
-    return import_table(text, "own.csv", options);
+    options.hints = hints;
+    return import_groups(text, "own.csv", options);
   });
   accept_or_refuse([&] { return parse_column_role(text); });
+  accept_or_refuse([&] { return parse_layout(std::string(text), "layout.yaml"); });
+  accept_or_refuse([&] {
+    for (const Import& import : import_groups(text, "own.csv", {})) (void)judged_fit(import.table);
+    return 0;
+  });
   accept_or_refuse([&] { return read_k_table(text, "K.csv", "N/RPM^2"); });
   accept_or_refuse([&] { return kphi::results::parse_steps(text, "steps.csv"); });
   return 0;

@@ -79,7 +79,8 @@ inline const std::vector<Room>& rooms() {
       {"fit/plan", {"base", "compensation", "profiles", "results", "fit"}},
       {"fit/coefficients", {"base", "compensation", "results", "fit"}},
       {"fit/report", {"base", "compensation", "results", "fit"}},
-      {"fit/logs", {"base", "compensation", "results", "fit"}},
+      // A layout file is a profile as others are.
+      {"fit/logs", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
       {"fit/export", {"base", "compensation", "profiles/vehicle.hpp", "results", "fit"}},
 
       // Drivers that are not kphi's own: what anybody's would see.

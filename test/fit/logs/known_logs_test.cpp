@@ -38,7 +38,7 @@ class KnownLogs : public ::testing::TestWithParam<std::size_t> {
 };
 
 TEST_P(KnownLogs, GiveTheFitOfTheRowsThatMustBeTaken) {
-  const ImportedTable imported = select_rows(read_rcbenchmark(log_.text, log_.name + ".csv"), log_.selection);
+  const ImportedTable imported = select_rows(read_log(log_.text, log_.name + ".csv"), log_.selection);
   EXPECT_EQ(imported.rows_total, log_.rows_total);
   ASSERT_EQ(imported.size(), log_.used.size());
   const ThrustFit origin = fit_thrust(points_of(imported));
@@ -58,7 +58,7 @@ TEST_P(KnownLogs, GiveTheFitOfTheRowsThatMustBeTaken) {
 }
 
 TEST_P(KnownLogs, HaveTheirKnownDefectsAndNoOthers) {
-  const auto findings = audit(read_rcbenchmark(log_.text, log_.name + ".csv"), {});
+  const auto findings = audit(read_log(log_.text, log_.name + ".csv"), {});
   for (std::size_t i = 0; i < findings.size(); ++i)
     ASSERT_LT(i, log_.findings.size()) << name_of(findings[i].kind) << ": " << findings[i].text;
   ASSERT_EQ(findings.size(), log_.findings.size()) << "missing: " << name_of(log_.findings[findings.size()].kind);
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(All, KnownLogs, ::testing::Range<std::size_t>(0, known_
 
 TEST(SyntheticLogs, HaveTheTruthBehindTheirK) {
   const auto k = [](const KnownLog& log) {
-    return fit_thrust(points_of(select_rows(read_rcbenchmark(log.text, "l.csv"), log.selection))).parameters.k;
+    return fit_thrust(points_of(select_rows(read_log(log.text, "l.csv"), log.selection))).parameters.k;
   };
   EXPECT_NEAR(k(averaged_sweep(1.13e-6)) / 1.13e-6, 1, 1e-9);
   EXPECT_NEAR(k(two_speeds(9e-6, {.speed = SpeedSource::optical, .speed_above_rpm = 1000}, 7)) / 9e-6, 1, 1e-9);
@@ -95,7 +95,7 @@ TEST(SyntheticLogs, OfOnePropellerShowTheFilesUnlikeTheOthers) {
   std::set<std::string> outliers;
   for (int i = 0; i < 20; ++i) {
     const double factor = i == 4 ? 1.3 : i == 11 ? 0.88 : 1 + 0.004 * (i % 5 - 2);
-    const auto imported = select_rows(read_rcbenchmark(averaged_sweep(1.1e-6 * factor).text, "l.csv"));
+    const auto imported = select_rows(read_log(averaged_sweep(1.1e-6 * factor).text, "l.csv"));
     group.push_back({std::to_string(i), fit_thrust(points_of(imported)).parameters.k});
   }
   for (const GroupOutlier& outlier : group_outliers(group)) outliers.insert(outlier.name);
@@ -165,8 +165,8 @@ TEST_F(RealData, GiveTheReferenceFitsInAllRows) {
     const std::string& variant = row.fields[reference.column("variant")];
     SCOPED_TRACE(file + ": " + variant);
     const std::string text = results::read_text(folder + file);
-    const ImportedTable imported = file.starts_with("uiuc") ? read_uiuc(text, folder + file)
-                                                            : selected(read_rcbenchmark(text, folder + file), variant);
+    const ImportedTable imported =
+        file.starts_with("uiuc") ? read_uiuc(text, folder + file) : selected(read_log(text, folder + file), variant);
     EXPECT_EQ(static_cast<double>(imported.rows_total), number("rows_total"));
     ASSERT_EQ(static_cast<double>(imported.size()), number("rows_used"));
     const auto points = points_of(imported);
@@ -186,7 +186,7 @@ std::map<std::string, std::vector<LogFinding>> findings_of(const std::string& fo
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".csv") continue;
     const std::string path = entry.path().string();
-    all[entry.path().stem().string()] = audit(read_rcbenchmark(results::read_text(path), path), {});
+    all[entry.path().stem().string()] = audit(read_log(results::read_text(path), path), {});
   }
   return all;
 }
@@ -241,7 +241,7 @@ TEST_F(RealData, OfOnePropellerShowsTheFilesUnlikeTheOthers) {
     for (const auto& entry : std::filesystem::directory_iterator(folder + "rcb1520-5inch")) {
       const std::string path = entry.path().string(), name = entry.path().stem().string();
       if (entry.path().extension() != ".csv" || name[1] != propeller) continue;
-      const auto imported = select_rows(read_rcbenchmark(results::read_text(path), path));
+      const auto imported = select_rows(read_log(results::read_text(path), path));
       group.push_back({name, fit_thrust(points_of(imported)).parameters.k});
     }
     ASSERT_EQ(group.size(), 20u);
@@ -315,7 +315,7 @@ TEST_F(RealData, OfUiucIsClean) {
 
 TEST_F(RealData, ReportTheLineWithUnquotedCommas) {
   const std::string path = folder + "rcb1780-timeseries/ConstVel_2021-06-17_084922.csv";
-  const StandLog log = read_rcbenchmark(results::read_text(path), path);
+  const StandLog log = read_log(results::read_text(path), path);
   ASSERT_EQ(log.problems.size(), 1u);
   EXPECT_EQ(log.problems[0].line, 2u);
   EXPECT_EQ(log.rows.size(), 4022u);

@@ -22,7 +22,7 @@ StandLog sweep() {
   StandLog log{.path = "log.csv", .thrust_unit = "N", .has_electrical = true, .has_optical = true};
   for (int i = 0; i < 12; ++i) {
     const double rpm = 3000 + 1200.0 * i;
-    StandRow row{.line = static_cast<std::size_t>(i) + 2, .thrust_n = thrust_of(rpm)};
+    StandRow row{.line = static_cast<std::uint32_t>(i) + 2, .thrust_n = thrust_of(rpm)};
     row.time_s = 5.0 * i;
     row.throttle_us = 1050 + 80.0 * i;
     row.electrical_rpm = row.optical_rpm = rpm;
@@ -40,7 +40,7 @@ StandLog series(unsigned seed = 1) {
   StandLog log{.path = "log.csv", .thrust_unit = "N", .has_optical = true};
   for (int i = 0; i < 480; ++i) {
     const bool turning = i >= 40 && i < 440;
-    StandRow row{.line = static_cast<std::size_t>(i) + 2};
+    StandRow row{.line = static_cast<std::uint32_t>(i) + 2};
     row.time_s = 0.04 * i;
     row.throttle_us = turning ? 1500 : 1000;
     row.optical_rpm = turning ? 5000 + 3 * noise(random) : 0;
@@ -179,7 +179,7 @@ TEST(LogAudit, CountsIndependentRowsOfALongLogByItsBegin) {
   double memory = 0;
   for (std::size_t i = 0; i < 200'000; ++i) {
     memory = 0.9 * memory + noise(random);
-    StandRow row{.line = i + 2, .thrust_n = thrust_of(5000) + memory};
+    StandRow row{.line = static_cast<std::uint32_t>(i) + 2, .thrust_n = thrust_of(5000) + memory};
     row.optical_rpm = 5000;
     log.rows.push_back(row);
   }
