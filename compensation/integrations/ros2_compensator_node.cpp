@@ -176,13 +176,18 @@ class CompensatorNode : public rclcpp::Node {
 
   void take_arms() {
     flying::Rotors<kphi::Radians> angles(arms_.size());
-    // Each joint has an age of its own, the library one for all: as rates times ages over one second.
+    // Each joint has an age of its own, the library one for all: as rates times ages over that one. A joint that is too
+    // old by itself moves faster than any.
+    constexpr double kAge_s = 0.25, kTooFast = 1e6;
+    const double oldest_s = flying::ArmLimits{}.oldest.value();
     flying::ArmFeedback motion;
-    motion.age = kphi::Seconds(1);
+    motion.age = kphi::Seconds(kAge_s);
     motion.rates = flying::Rotors<kphi::RadPerSec>(arms_.size());
     for (std::size_t i = 0; i < arms_.size(); ++i) {
       angles[i] = kphi::Radians(arms_[i].angle);
-      motion.rates[i] = kphi::RadPerSec(arms_[i].rate * (now() - arms_[i].stamp).seconds());
+      const double age_s = (now() - arms_[i].stamp).seconds();
+      motion.rates[i] = kphi::RadPerSec(
+          std::isfinite(arms_[i].angle) && age_s > oldest_s ? kTooFast : arms_[i].rate * age_s / kAge_s);
     }
     compensator_.set_arms(angles, motion);
   }

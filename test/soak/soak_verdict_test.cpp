@@ -374,7 +374,7 @@ TEST(SoakVerdict, NamesAStreamThatDoesNotComeBackOrIsFoughtFor) {
       after_an_absence("no sample since", reboot, seen({K::silent, K::reconnected}, 7s, 2, ""), "the newest sample"),
       after_an_absence("it counts as failed", reboot, seen({K::silent, K::reconnected}, 12s, 2, "silent"), "as failed"),
       after_an_absence("no event", reboot, seen({K::silent, K::resumed}, 12s, 2, ""), "that the stream came back"),
-      after_an_absence("another event", loss, seen({K::silent, K::reconnected}, 12s, 1, ""), "the stream came back"),
+      after_an_absence("another event", loss, seen({K::silent, K::restarted}, 12s, 1, ""), "the stream came back"),
       after_an_absence("a fight", taken, seen({K::silent, K::taken_over}, 7s, 2, "silent"), "2 starts of a stream"),
       after_an_absence("no reason", taken, seen({K::silent}, 7s, 1, "silent"), "was taken over"),
       after_an_absence("it counts as working", taken, seen({K::silent, K::taken_over}, 7s, 1, ""), "as working"),

@@ -176,6 +176,10 @@ void World::live_campaign() {
   } catch (const daq::SafetyStop& e) {
     story_.end = End::stopped;
     story_.reason = e.what();
+  } catch (const daq::RunStopped& e) {
+    const bool refused = e.exit_code() == ExitCode::no_device || e.exit_code() == ExitCode::usage;
+    story_.end = refused ? End::refused : End::disk;
+    story_.reason = e.what();
   } catch (const RecordError& e) {
     story_.end = End::disk;
     story_.reason = e.what();
