@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "base/error.hpp"
+#include "daq/guard/run_stopped.hpp"
 #include "drivers/scpi/scpi_supply.hpp"
 #include "drivers/supply/modbus_supply.hpp"
 #include "drivers/supply/wire.hpp"
