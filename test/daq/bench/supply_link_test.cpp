@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "daq/guard/interlock.hpp"
+#include "test/daq/bench_fixture.hpp"
 #include "test/daq/queue_bench.hpp"
 
 namespace kphi::daq {
