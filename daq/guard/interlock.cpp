@@ -113,19 +113,14 @@ void rethrow_without_power(SupplyLink* supply) {
   const auto cause = std::current_exception();
   StopWords words = words_of(cause);
   if (supply != nullptr && words.state.empty()) words.leaves(supply->switch_off());
-  try {
+  const RunStopped* stopped = as<RunStopped>(cause);
+  // As it was thrown, whatever its type, where there is nothing to add.
+  if (words.state.empty() || (stopped != nullptr && words.state == stopped->words().state))
     std::rethrow_exception(cause);
-  } catch (const SafetyStop& stop) {
-    throw words.state == stop.words().state ? stop : SafetyStop(words);
-  } catch (const Interrupted&) {
-    throw Interrupted(words);
-  } catch (const Error& error) {
-    if (words.state.empty()) throw;
-    throw RunStopped(words, error.exit_code());
-  } catch (const std::exception&) {
-    if (words.state.empty()) throw;
-    throw RunStopped(words, ExitCode::failure);
-  }
+  if (as<SafetyStop>(cause) != nullptr) throw SafetyStop(words);
+  if (as<Interrupted>(cause) != nullptr) throw Interrupted(words);
+  const Error* error = as<Error>(cause);
+  throw RunStopped(words, error != nullptr ? error->exit_code() : ExitCode::failure);
 }
 
 void leave_without_power(Bench& bench, const std::function<void()>& work) {

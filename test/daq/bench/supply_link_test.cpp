@@ -113,6 +113,17 @@ TEST(MotorPower, IsCutHoweverTheWorkAtTheBenchEndsAndIsToldOfOnce) {
   EXPECT_EQ(state_after({.cause = "stopped by request", .state = "supply: output off"}), "supply: output off");
 }
 
+TEST(MotorPower, ThatIsConfirmedOffLeavesTheEndOfTheWorkAsItWas) {
+  struct MoreThanAnInterruption : Interrupted {
+    using Interrupted::Interrupted;
+  };
+  QueueSupply supply;
+  QueueBench bench;
+  bench.supply_link = &supply;
+  const auto leave = [&] { leave_without_power(bench, [] { throw MoreThanAnInterruption("nobody was there"); }); };
+  EXPECT_TRUE(thrown_by<MoreThanAnInterruption>(leave).has_value());
+}
+
 TEST(MotorPower, ComesBackToNoBenchWhoseComputerSlept) {
   PoweredMotor bench;
   MotorPower power(&bench.supply, test::never);
