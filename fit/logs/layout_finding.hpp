@@ -22,7 +22,4 @@ struct LayoutHints {
 /// read in two ways, with what either would mean, and how to say which.
 [[nodiscard]] Layout find_layout(std::string_view begin, const std::string& path, const LayoutHints& hints = {});
 
-/// Throws ConfigurationError with the next move for what is no text: a workbook, an archive, a log of a flight stack.
-void refuse_other_formats(std::string_view begin, const std::string& path);
-
 }  // namespace kphi::fit

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 
 #include "base/error.hpp"
@@ -12,6 +13,7 @@
 #include "base/statistics.hpp"
 #include "base/text.hpp"
 #include "fit/logs/clock_time.hpp"
+#include "fit/logs/other_formats.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -243,34 +245,14 @@ StandLog read_rows(TextBlocks text, const std::string& path, Layout layout) {
 }  // namespace
 
 Channel channel_of(Role role) {
-  switch (role) {
-    case Role::time:
-      return &StandRow::time_s;
-    case Role::throttle:
-      return &StandRow::throttle_us;
-    case Role::speed:
-      return &StandRow::optical_rpm;
-    case Role::electrical_speed:
-      return &StandRow::electrical_rpm;
-    case Role::torque:
-      return &StandRow::torque_nm;
-    case Role::voltage:
-      return &StandRow::voltage_v;
-    case Role::current:
-      return &StandRow::current_a;
-    case Role::occlusion:
-      return &StandRow::occlusion_deg;
-    case Role::repetition:
-      return &StandRow::repetition;
-    case Role::target_speed:
-      return &StandRow::target_rpm;
-    case Role::thrust:
-    case Role::propeller:
-    case Role::motor:
-    case Role::direction:
-      break;
-  }
-  return nullptr;
+  static constexpr std::pair<Role, Channel> kChannels[]{
+      {Role::time, &StandRow::time_s},           {Role::throttle, &StandRow::throttle_us},
+      {Role::speed, &StandRow::optical_rpm},     {Role::electrical_speed, &StandRow::electrical_rpm},
+      {Role::torque, &StandRow::torque_nm},      {Role::voltage, &StandRow::voltage_v},
+      {Role::current, &StandRow::current_a},     {Role::occlusion, &StandRow::occlusion_deg},
+      {Role::repetition, &StandRow::repetition}, {Role::target_speed, &StandRow::target_rpm}};
+  const auto found = std::ranges::find(kChannels, role, &std::pair<Role, Channel>::first);
+  return found == std::end(kChannels) ? nullptr : found->second;
 }
 
 bool motor_off(const StandRow& row, SpeedSource source) {
