@@ -46,7 +46,7 @@ class FlownCurves {
     Radians occlusion;
     Real value;
   };
-  /// Where these knots are, or could be put, which store_ then is; false if there is no room.
+  /// Lets `piece` name these knots, which are stored once for all curves that have them; false if there is no room.
   bool place(const KnotList& knots, Piece& piece) noexcept;
 
   Rotors<Curve> curves_;

@@ -9,7 +9,7 @@ namespace kphi::flight {
 namespace {
 
 constexpr double kLostMetres = 1.0;
-constexpr std::uint64_t kMotorStream = 101;  // of a scene's seed, besides those of its nine flights
+constexpr std::uint64_t kMotorStream = 101;  // random numbers of the motors; the nine flights use other streams
 static_assert(kLongestGyroDelay / kStep < 31);
 
 /// Sums over the part of a leg that counts.

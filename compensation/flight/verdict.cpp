@@ -84,7 +84,7 @@ bool is_fit(const Scene& scene, const Shadow& shadow) {
   return judgement_of(findings_of({{scene, fly_all(scene, shadow)}})).fitness == Fitness::fit_to_fly;
 }
 
-/// The last of `steps` before the first with which a file is no longer fit to fly; 1 if the first is not.
+/// Makes the file worse step by step while it is still called fit to fly; the last such step, 1 if there is none.
 template <std::size_t N, class With>
 double last_fit(const std::array<double, N>& steps, const Shadow& shadow, const With& with) {
   double last = 1;

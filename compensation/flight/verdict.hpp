@@ -27,7 +27,7 @@ inline constexpr double kSidewaysRatio = 1.15;   ///< horizontal error with comp
 /// Of many draws, or of one.
 [[nodiscard]] Judgement judgement_of(const Findings& findings);
 
-/// What a file may be wrong by and still be called fit to fly, in the circumstances of one scene: as far as was tried.
+/// Errors of a file that the verdict does not notice in one scene: the largest of those tried.
 struct BlindZone {
   double least_fall = 1, most_fall = 1;  ///< what k(φ) loses over φ, as a share of what the file says
   double least_k_t = 1, most_k_t = 1;    ///< K_T of the file over that of the air

@@ -16,7 +16,7 @@ struct MorphingVehicle {
   float reference[KPHI_MAX_ROTORS];  ///< rad: arm angles of the shape that PX4's normalisation and gains are for
 };
 
-/// Value of a parameter of PX4; NaN if there is none of that name.
+/// Reads a parameter of PX4; NaN: PX4 has none of that name.
 using ParameterReader = float (*)(const char* name);
 /// From CA_ROTOR_COUNT, CA_ROTORn_CT, CA_ROTORn_KM and the KPHI_… of px4_parameters.yaml. nullptr, or the name of the
 /// parameter that is missing or makes no sense.
@@ -24,8 +24,8 @@ const char* read_morphing_vehicle(ParameterReader parameter, MorphingVehicle& ve
 
 class ActuatorEffectivenessMorphing : public ActuatorEffectiveness {
  public:
-  /// nullptr, or why the vehicle cannot be flown: then there is no matrix, and PX4 drives no motor. Until arms are
-  /// measured they count as those of the reference shape.
+  /// Returns nullptr, or the reason why this vehicle cannot fly; there is no matrix then, and PX4 drives no motor.
+  /// Until arms are measured, they count as those of the reference shape.
   const char* build(const MorphingVehicle& vehicle);
 
   /// In the allocator's work queue, at the rate of the servos' feedback: [rad], [rad/s], and how old it is [s].

@@ -139,7 +139,7 @@ class CompensatorNode : public rclcpp::Node {
     return *outcome.compensator;
   }
 
-  /// Without a torque per thrust there is no mixer, and no wrench is taken.
+  /// nullopt if no drag torque per thrust is given; the node then ignores wrenches.
   std::optional<flying::Mixer> mixer() {
     const double drag = number("vehicle.drag_per_newton_m");
     const Numbers hubs = numbers("vehicle.hub_mass_kg"), body_at = numbers("vehicle.body_at_m");

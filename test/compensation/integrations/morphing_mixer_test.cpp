@@ -28,7 +28,22 @@ morphingVehicle_t vehicle() {
     made.airframe.hinge_turns[i] = i;
     made.masses.at_hubs[i] = 0.045F;
     made.spins[i] = i % 2 == 0 ? 1 : -1;
-    made.curves[i] = {kCoefficient, 1.03F * kCoefficient, -0.1655F * kCoefficient, 4.7F, KPHI_RIM_ARC, 0, 0, 0, 0, 0};
+    made.curves[i] = {kCoefficient,
+                      1.03F * kCoefficient,
+                      -0.1655F * kCoefficient,
+                      4.7F,
+                      KPHI_RIM_ARC,
+                      0,
+                      0,
+                      0,
+                      0,
+                      0,
+                      0,
+                      {},
+                      0,
+                      {},
+                      0,
+                      0};
   }
   return made;
 }

@@ -373,9 +373,10 @@ TEST(ExportFlown, ToArduPilotByItsScriptedMatrix) {
     for (const Case& one : cases())
       arms += fmt::format("{:.17g} {:.17g} {:.17g} {:.17g}\n", one.arms[0], one.arms[1], one.arms[2], one.arms[3]);
     test::write_file(path + "arms", arms);
-    const auto ran = read_with(fmt::format("lua5.4 {} {}kphi.lua {:.17g} {:.17g} < {}arms",
-                                           test::source_dir() + "/test/compensation/integrations/ardupilot/stub.lua",
-                                           path, vehicle.arm_angle_min.value(), vehicle.arm_angle_max.value(), path));
+    const auto ran =
+        read_with(fmt::format("lua5.4 {} {}kphi.lua {:.17g} {:.17g} < {}arms",
+                              test::source_dir() + "/test/compensation/integrations/ardupilot/bindings.lua", path,
+                              vehicle.arm_angle_min.value(), vehicle.arm_angle_max.value(), path));
     ASSERT_EQ(ran.status, 0) << ran.out;
     EXPECT_THAT(ran.out, HasSubstr("kphi: k is "));
 
