@@ -19,14 +19,14 @@ using results::QualityFlag;
 using Findings = std::vector<LogFinding>;
 using Rows = std::vector<const StandRow*>;
 
-constexpr std::array kNames{
-    "speed_ratio",    "speed_disagrees",    "speed_dead",    "speed_spike",     "speed_missing",
-    "barely_turning", "not_turning",        "coasting",      "current_limit",   "untared",
-    "zero_missing",   "zero_drifted",       "zero_scatters", "negative_thrust", "thrust_frozen",
-    "thrust_drifts",  "correlated_noise",   "time_backward", "time_repeated",   "not_a_number",
-    "other_fields",   "k_unlike_its_group", "speed_frozen",  "speed_doubled",   "row_unlike",
-    "speed_stepped",  "zero_fitted",        "zero_unknown",  "several_groups",  "one_k_misfits"};
-static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::one_k_misfits) + 1);
+constexpr std::array kNames{"speed_ratio",    "speed_disagrees",    "speed_dead",    "speed_spike",     "speed_missing",
+                            "barely_turning", "not_turning",        "coasting",      "current_limit",   "untared",
+                            "zero_missing",   "zero_drifted",       "zero_scatters", "negative_thrust", "thrust_frozen",
+                            "thrust_drifts",  "correlated_noise",   "time_backward", "time_repeated",   "not_a_number",
+                            "other_fields",   "k_unlike_its_group", "speed_frozen",  "speed_doubled",   "row_unlike",
+                            "speed_stepped",  "zero_fitted",        "zero_unknown",  "several_groups",  "one_k_misfits",
+                            "speed_too_low"};
+static_assert(kNames.size() == static_cast<std::size_t>(FindingKind::speed_too_low) + 1);
 
 /// Of the steps concerned.
 QualityFlag flag_of(FindingKind kind) {
@@ -162,8 +162,14 @@ void audit_standstill(const StandLog& log, SpeedSource source, double zero_n, Fi
   }
   add(findings, FindingKind::speed_missing, missing,
       "speed reads 0 while there is thrust: the sensor does not see the propeller; rows skipped");
-  add(findings, FindingKind::barely_turning, barely,
-      "speed below 100 RPM: such rows hardly count in a fit, but their own T/ω² means nothing");
+  if (turned)
+    add(findings, FindingKind::barely_turning, barely,
+        "speed below 100 RPM: such rows hardly count in a fit, but their own T/ω² means nothing");
+  else
+    add(findings, FindingKind::speed_too_low, barely,
+        "no row reaches 100 RPM: the speeds are in another unit, or their mark is one between thousands; say which "
+        "with "
+        "--column speed=HEADER:UNIT or --decimal comma");
   add(findings, FindingKind::not_turning, still, "the motor does not turn with the throttle above idle; rows skipped");
   add(findings, FindingKind::coasting, coasting,
       "the propeller turns with the throttle idle: such rows cannot give a zero");
@@ -352,7 +358,7 @@ const char* name_of(FindingKind kind) { return kNames[static_cast<std::size_t>(k
 
 bool spoils_k(FindingKind kind) {
   using enum FindingKind;
-  return kind == thrust_drifts || kind == zero_unknown || kind == one_k_misfits;
+  return kind == thrust_drifts || kind == zero_unknown || kind == one_k_misfits || kind == speed_too_low;
 }
 
 std::optional<PoleRatio> pole_ratio(double ratio) {

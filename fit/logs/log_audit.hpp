@@ -43,6 +43,7 @@ enum class FindingKind : std::uint8_t {
   zero_unknown,        ///< no such rows, and speeds too alike to tell
   several_groups,      ///< rows of several things, fitted apart
   one_k_misfits,       ///< one k does not describe the rows
+  speed_too_low,       ///< no row reaches 100 RPM
 };
 
 /// "speed_ratio"

@@ -230,7 +230,7 @@ std::string caution_text(const Identification& identification, const Analysis& a
   }
   for (const std::string& remark : analysis.remarks) text += fmt::format("remark        {}\n", remark);
   if (!identification.air)
-    text += "air density   unknown: k holds for the air of that day only; add `ambient:` to the bench file\n";
+    text += "air density   unknown: k holds for the air of that day only; a bench measures it with `ambient:`\n";
   return text;
 }
 

@@ -86,6 +86,16 @@ std::string ramp(double zero_n, double sign, double noise_n, std::uint64_t seed,
   return text;
 }
 
+TEST(SpeedsOfALog, AThousandTimesTooSlowGiveNoK) {
+  // "2.000" RPM beside "0.296" N: whoever exported it grouped the one and not the other.
+  std::string text = "rpm;thrust (N)\n";
+  for (int thousands = 2; thousands <= 14; ++thousands)
+    text += fmt::format("{}.000;{:.3f}\n", thousands, newtons(1000 * thousands));
+  const Outcome outcome = outcome_of(text);
+  EXPECT_TRUE(outcome.spoilt) << outcome.said;
+  EXPECT_THAT(outcome.said, HasSubstr("no row reaches 100 RPM"));
+}
+
 TEST(UntaredLog, IsFittedWithItsOffset) {
   for (const double zero : {-4.0, -1.6, -0.6, -0.3, 0.3, 0.8, 3.0}) {
     const Outcome outcome = outcome_of(ramp(zero, 1, 0.01, 1));
