@@ -118,7 +118,7 @@ Layout find_layout(std::string_view begin, const std::string& path, const Layout
   layout.first_row = above > 0 ? above + 1 : lines[shape.first].number;
   for (const TextLine& line : lines)
     if (layout.comment.empty() && line.number != layout.units_line) layout.comment = line.comment;
-  find_roles(path, lines, shape, hints, layout);
+  find_roles(path, lines, shape, hints.columns, layout);
   const SampleRows rows = rows_of(begin, layout);
   layout.numbers = marks_of(path, rows, layout, hints);
   for (LayoutColumn& column : layout.columns) {

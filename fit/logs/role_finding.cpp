@@ -10,7 +10,6 @@
 #include "base/number.hpp"
 #include "base/text.hpp"
 #include "fit/logs/clock_time.hpp"
-#include "fit/logs/column_roles.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -35,17 +34,16 @@ struct Candidate {
 class RoleFinder {
  public:
   RoleFinder(const std::string& path, const std::vector<TextLine>& lines, const TableShape& shape,
-             const LayoutHints& hints, Layout& layout)
+             const std::vector<ColumnRole>& hints, Layout& layout)
       : path_(path), lines_(lines), shape_(shape), hints_(hints), layout_(layout) {}
 
   void find() {
-    for (const ColumnRole& wanted : hints_.columns) take_hint(wanted);
-    if (shape_.header) {
+    for (const ColumnRole& wanted : hints_) take_hint(wanted);
+    if (shape_.header)
       for (const Role role : {Role::speed, Role::electrical_speed, Role::thrust, Role::time, Role::throttle,
                               Role::torque, Role::voltage, Role::current, Role::occlusion, Role::repetition,
                               Role::target_speed, Role::propeller, Role::motor, Role::direction})
         if (!named(role)) look_for(role);
-    }
     require(Role::thrust);
     require(Role::speed);
     std::ranges::stable_sort(layout_.columns, {}, [](const LayoutColumn& column) { return column.role; });
@@ -55,7 +53,7 @@ class RoleFinder {
   [[nodiscard]] std::size_t line() const { return lines_[shape_.header.value_or(shape_.first)].number; }
   [[nodiscard]] bool named(Role role) const {
     const bool speed = role == Role::speed || role == Role::electrical_speed;
-    return std::ranges::any_of(hints_.columns, [&](const ColumnRole& hint) {
+    return std::ranges::any_of(hints_, [&](const ColumnRole& hint) {
       return hint.role == role || (speed && (hint.role == Role::speed || hint.role == Role::electrical_speed));
     });
   }
@@ -229,14 +227,14 @@ class RoleFinder {
   const std::string& path_;
   const std::vector<TextLine>& lines_;
   const TableShape& shape_;
-  const LayoutHints& hints_;
+  const std::vector<ColumnRole>& hints_;
   Layout& layout_;
 };
 
 }  // namespace
 
 void find_roles(const std::string& path, const std::vector<TextLine>& lines, const TableShape& shape,
-                const LayoutHints& hints, Layout& layout) {
+                const std::vector<ColumnRole>& hints, Layout& layout) {
   RoleFinder(path, lines, shape, hints, layout).find();
 }
 

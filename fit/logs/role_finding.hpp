@@ -4,14 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "fit/logs/layout_finding.hpp"
+#include "fit/logs/layout.hpp"
 #include "fit/logs/table_shape.hpp"
 
 namespace kphi::fit {
 
-/// Gives `layout` its columns: as told by the hints, else by their names and units. Throws ConfigurationError
+/// Gives `layout` its columns: as told, else by their names and units. Throws ConfigurationError
 /// (path:line) where thrust or speed is missing or doubtful; what is left out is named in `layout.unread`.
 void find_roles(const std::string& path, const std::vector<TextLine>& lines, const TableShape& shape,
-                const LayoutHints& hints, Layout& layout);
+                const std::vector<ColumnRole>& hints, Layout& layout);
 
 }  // namespace kphi::fit

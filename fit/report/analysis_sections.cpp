@@ -198,7 +198,7 @@ std::string standard_section(const Fitted& fitted) {
   if (analysis.standard.empty()) {
     return html_heading(title) +
            "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and k at standard density "
-           "is not given. 10 K or 30 hPa change the density by 3 %. Add `ambient:` to the bench file.</p>\n";
+           "is not given. 10 K or 30 hPa change the density by 3 %. A bench measures it with `ambient:`.</p>\n";
   }
   HtmlTable table({"φ", "k · 1.225/ρ, N/(rad/s)²", "N/RPM²"});
   for (std::size_t i = 0; i < analysis.standard.size(); ++i) {

@@ -161,7 +161,9 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool
 std::string format_report(const Fitted& fitted, const Chapter& chapter) {
   int number = 0;
   const std::string name = html_escaped(fitted.identification.propeller);
-  return page_head("k(φ) of " + name, name + ": how an occlusion costs thrust",
+  const auto [what, subject] = fitted.identification.alone() ? std::pair("K_T", "thrust coefficient")
+                                                             : std::pair("k(φ)", "how an occlusion costs thrust");
+  return page_head(what + (" of " + name), name + ": " + subject,
                    propeller_line(fitted.identification, chapter.provenance)) +
          body(fitted, chapter, number, true) + kPageEnd;
 }
