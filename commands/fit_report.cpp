@@ -25,6 +25,7 @@
 #include "fit/signal/blade_pass.hpp"
 #include "fit/signal/dynamics.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "profiles/stand_drawing.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/run_reader.hpp"
@@ -64,10 +65,17 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
+/// Of a campaign's stand; empty without one.
+std::string drawing_of(const FitInput& input) {
+  if (!input.measured_by) return {};
+  return profiles::draw_stand(profiles::sketch_of(input.measured_by->propeller, input.bench.iq.spin),
+                              input.measured_by->occlusions_deg);
+}
+
 /// `apart`: how the names of page and figures begin, apart from those of the campaign in the same folder.
 void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {}) {
   const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"));
-  write_page(page, format_report(fitted, {input.provenance, figures}));
+  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input)}));
 }
 
 struct FitRequest {

@@ -21,8 +21,8 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   EXPECT_EQ(plan.mountings, 15);
   EXPECT_EQ(plan.steps, 600);
   EXPECT_EQ(plan.spinning, Seconds(1200));
-  EXPECT_EQ(plan.bench, Seconds(1260));
-  EXPECT_EQ(plan.samples, 8'820'000u);
+  EXPECT_EQ(plan.bench, Seconds(1260 + 15 * 3.5)) << "zeros, and from the last step to rest";
+  EXPECT_EQ(plan.samples, 9'187'500u);
 }
 
 TEST(Plan, CountsTheTimeThatTheBoxesBiasTakes) {
@@ -138,7 +138,7 @@ TEST(Plan, CountsTheStepsOfTheWayBackAndTheTimeOfRamps) {
 TEST(Plan, CountsSamplesAtTheBenchsRate) {
   const Campaign campaign = parse_campaign(kCampaignText, "c.yaml");         // 6 runs of 4 steps of 2 s, zeros of 3 s
   const Plan plan = make_plan(campaign, parse_bench(kBenchText, "b.yaml"));  // 3500 Hz
-  EXPECT_EQ(plan.samples, 6u * (8 + 6) * 3500);
+  EXPECT_EQ(plan.samples, 6u * (2 * (8 + 6) + 7) * 3500 / 2) << "3.5 s to rest after each";
 }
 
 TEST(Plan, IsRefusedOnABenchWhoseMotorOrStandMayNotTurnSoFast) {
