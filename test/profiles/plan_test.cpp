@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -23,6 +24,17 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   EXPECT_EQ(plan.spinning, Seconds(1200));
   EXPECT_EQ(plan.bench, Seconds(1260 + 15 * 3.5)) << "zeros, and from the last step to rest";
   EXPECT_EQ(plan.samples, 9'187'500u);
+}
+
+TEST(Plan, OfTheDemoIsWhatTheReadmeSays) {
+  const Plan plan =
+      make_plan(load_campaign(shipped("icra2021_5in_3blade.yaml")), load_bench(shipped("bench_simulated.yaml")));
+  std::ifstream file(kphi::test::source_dir() + std::string("/README.md"));
+  const std::string readme((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_THAT(readme,
+              testing::HasSubstr(fmt::format("{} runs of {} steps", plan.runs.size(), plan.runs.front().steps.size())));
+  EXPECT_THAT(readme, testing::ContainsRegex(
+                          fmt::format("planned: {:.1f}[[:space:]]million", static_cast<double>(plan.samples) / 1e6)));
 }
 
 TEST(Plan, CountsTheTimeThatTheBoxesBiasTakes) {
