@@ -151,9 +151,10 @@ Compensator compensator_of(const CompensateRequest& request, const profiles::Veh
   for (std::size_t i = 0; i < request.coefficients.size(); ++i) {
     const std::string& file = request.coefficients[i];
     if (!told.insert(file).second) continue;
-    if (outcome.doubts[i].gains_with_occlusion)
+    const CurveDoubts doubts = doubts_about(curves[i], law);
+    if (doubts.gains_with_occlusion)
       std::cerr << file << ": k(φ) does not fall with the occlusion; check that this is the right file\n";
-    if (outcome.doubts[i].steps_at_contact)
+    if (doubts.steps_at_contact)
       std::cerr << file << ": k(φ) misses K_T at 0°, so the speeds step at first contact; "
                 << "`kphi fit --anchored` avoids this\n";
   }

@@ -66,12 +66,10 @@ struct Airframe {
   return airframe.propeller_radii.size() == 0 ? airframe.propeller_radius : airframe.propeller_radii[rotor];
 }
 
-/// Hub on a square body, in the frame turned (and mirrored) with the hinge. The square looks alike from each corner, so
-/// this frame serves all four arms. θ = 45° points away from the body (X), 180° along the next edge (O).
-[[nodiscard]] HubPosition hub_seen_from_hinge(const Airframe& airframe, Radians arm_angle) noexcept;
-
-/// Hub of an arm on a body that is no square, in the body frame.
-[[nodiscard]] HubPosition hub_at_hinge(const Hinge& hinge, Metres arm_length, Radians arm_angle) noexcept;
+/// Where the hub of an arm stands beside the outline that covers it: in the body frame; on a square body in the frame
+/// turned (and mirrored) with the hinge, as the square looks alike from each of its corners: θ = 45° points away from
+/// the body (X), 180° along the next edge (O).
+[[nodiscard]] HubPosition hub_beside_body(const Airframe& airframe, std::size_t arm, Radians arm_angle) noexcept;
 
 /// Hub of an arm in the body frame: c_i = Rot(90° turn_i) (a + L cos θ_i, a + L sin θ_i) on the square.
 [[nodiscard]] HubPosition hub_in_body(const Airframe& airframe, std::size_t arm, Radians arm_angle) noexcept;

@@ -15,8 +15,6 @@ constexpr Real kRounding = sizeof(Real) == sizeof(double) ? Real(1e-9) : Real(1e
 constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
 constexpr Real kUnknownAngle = std::numeric_limits<Real>::quiet_NaN();
 
-bool positive(Real value) noexcept { return is_finite(value) && value > 0; }
-
 bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   unsigned seen = 0;
   for (const int turn : turns) {
@@ -26,14 +24,13 @@ bool one_corner_each(const std::array<int, 4>& turns) noexcept {
   return seen == 0b1111u;
 }
 
-bool known(const Hinge& hinge) noexcept {
-  return is_finite(hinge.at.x.value()) && is_finite(hinge.at.y.value()) && is_finite(hinge.turn.value());
-}
-
 Refusal refusal_of_body(const Airframe& airframe) noexcept {
   if (!airframe.polygon) return one_corner_each(airframe.hinge_turns) ? Refusal::none : Refusal::hinge_turns;
   const PolygonBody& body = *airframe.polygon;
-  if (!std::all_of(body.hinges.begin(), body.hinges.end(), known)) return Refusal::hinges;
+  for (const Hinge& hinge : body.hinges) {
+    for (const Real number : {hinge.at.x.value(), hinge.at.y.value(), hinge.turn.value()})
+      if (!is_finite(number)) return Refusal::hinges;
+  }
   for (std::size_t i = 0; i < body.more.size(); ++i) {
     if (!body.more[i]) continue;
     if (overlap(body.outline, *body.more[i])) return Refusal::body;
@@ -47,11 +44,11 @@ Refusal refusal_of_body(const Airframe& airframe) noexcept {
 Refusal refusal_of(const Airframe& airframe, std::size_t curves) noexcept {
   const std::size_t rotors = rotors_of(airframe), radii = airframe.propeller_radii.size();
   if (rotors < kFewestRotors || curves != rotors || (radii != 0 && radii != rotors)) return Refusal::rotors;
-  if ((!airframe.polygon && !positive(airframe.half_side.value())) || !positive(airframe.arm_length.value())) {
+  if ((!airframe.polygon && !is_positive(airframe.half_side.value())) || !is_positive(airframe.arm_length.value())) {
     return Refusal::sizes;
   }
   for (std::size_t i = 0; i < rotors; ++i) {
-    if (!positive(radius_of(airframe, i).value())) return Refusal::sizes;
+    if (!is_positive(radius_of(airframe, i).value())) return Refusal::sizes;
     if (!airframe.polygon && airframe.arm_length <= radius_of(airframe, i)) return Refusal::arm_length;
   }
   const Real slowest = airframe.slowest_speed.value(), fastest = airframe.fastest_speed.value();
@@ -115,17 +112,12 @@ BuildOutcome Compensator::build(const Rotors<ThrustCurve>& curves, const Airfram
               [](const void* from, Airframe& to) noexcept { to = *static_cast<const Airframe*>(from); },
               law};
   outcome.refusal = build_at(&outcome.compensator.emplace(), parts);
-  if (outcome.refusal != Refusal::none) {
-    outcome.compensator.reset();
-    return outcome;
-  }
-  outcome.doubts = Rotors<CurveDoubts>(curves.size());
-  for (std::size_t i = 0; i < curves.size(); ++i) outcome.doubts[i] = doubts_about(curves[i], law);
+  if (outcome.refusal != Refusal::none) outcome.compensator.reset();
   return outcome;
 }
 
 Refusal Compensator::build_at(void* place, const Parts& parts) noexcept {
-  Compensator& built = *::new (place) Compensator();
+  Compensator& built = *::new (place) Compensator;
   parts.put_airframe(parts.airframe, built.airframe_);
   built.law_ = parts.law;
   Refusal refusal = refusal_of(built.airframe_, parts.rotors);

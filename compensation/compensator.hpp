@@ -164,15 +164,16 @@ class Compensator {
   [[nodiscard]] const Rotors<Flags>& arm_flags() const noexcept { return arm_flags_; }
 
  private:
-  void begin() noexcept;
+  inline void begin() noexcept;
   /// What a new angle means for φ: nothing, that it is 0 again, or that it must be computed.
   enum class Arm : std::uint8_t { at_rest, left_body, near_body };
-  [[nodiscard]] Arm take(std::size_t i, Radians angle) noexcept;
+  [[nodiscard]] inline Arm take(std::size_t i, Radians angle) noexcept;
   void apply_occlusion(std::size_t rotor) noexcept;
   [[nodiscard]] bool follows_trends() const noexcept { return enabled_ && speed_trends_; }
-  void follow_trends(Real (&speeds)[kMostRotors]) const noexcept;
+  inline void follow_trends(Real (&speeds)[kMostRotors]) const noexcept;
   /// Adds what was done to these thrusts and to the speeds that they want.
-  void flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors], Rotors<Flags>& flags) const noexcept;
+  inline void flag(const Real (&asked)[kMostRotors], const Real (&wanted)[kMostRotors],
+                   Rotors<Flags>& flags) const noexcept;
 
   Rotors<Real> effective_coefficients_;  // K_T k_i with the air's density, positive: what speeds_for divides by
   Real density_ratio_ = 1;
@@ -188,14 +189,14 @@ class Compensator {
   Rotors<Real> scaling_factors_;
   Rotors<Newtons> thrust_max_;
   Rotors<Real> drag_scale_;
-  FlownCurves curves_;
   Airframe airframe_{};
   Rotors<ContactFreeWindow> contact_free_;
+  FlownCurves curves_;  // last: what is near the beginning costs a microcontroller less code
 };
 
 static_assert(std::is_trivially_copyable<Compensator>::value, "a Compensator is copied between threads as bytes");
 
-/// Of curves that can be flown but deserve a look.
+/// Of curves that can be flown but deserve a look. For the ground.
 struct CurveDoubts {
   bool gains_with_occlusion = false;  ///< k does not fall: the file may be of another propeller or sign
   bool steps_at_contact = false;      ///< k_i jumps at first contact: k(0) below K_T, or not equal (published law)
@@ -206,7 +207,6 @@ struct CurveDoubts {
 struct BuildOutcome {
   std::optional<Compensator> compensator;  ///< there unless refused
   Refusal refusal = Refusal::none;
-  Rotors<CurveDoubts> doubts;
 };
 
 }  // namespace kphi::compensation

@@ -1,30 +1,28 @@
 #include "compensation/flown_curves.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <cstring>
 
 #include "compensation/strict_math.hpp"
 
 namespace kphi::compensation {
 
 bool FlownCurves::place(const KnotList& knots, Piece& piece) noexcept {
-  const auto same_at = [&](std::size_t first) {
-    for (std::size_t i = 0; i < knots.count; ++i) {
-      const Knot knot = knots[i];
-      const Real further = (knot.occlusion - knots_[first + i].occlusion).value(),
-                 more = knot.value - knots_[first + i].value;
-      if (std::fabs(further) > 0 || std::fabs(more) > 0) return false;
+  // The first place where they are, or where they may go on beyond the last that is known.
+  std::size_t first = 0, same = 0;
+  while (same < knots.count && first + same < kMostKnots) {
+    const Knot asked = knots[same];
+    const FlownKnot knot{asked.occlusion, asked.value};
+    FlownKnot& here = knots_[first + same];
+    if (first + same >= knot_count_) here = knot;
+    if (std::memcmp(&here, &knot, sizeof knot) == 0) {
+      ++same;
+    } else {
+      ++first;
+      same = 0;
     }
-    return true;
-  };
-  std::size_t first = 0;
-  while (first + knots.count <= knot_count_ && !same_at(first)) ++first;
-  if (first + knots.count > knot_count_) {
-    first = knot_count_;
-    if (first + knots.count > kMostKnots) return false;
-    for (std::size_t i = 0; i < knots.count; ++i) knots_[first + i] = {knots[i].occlusion, knots[i].value};
-    knot_count_ = static_cast<std::uint8_t>(first + knots.count);
   }
+  if (same < knots.count) return false;
+  if (first + same > knot_count_) knot_count_ = static_cast<std::uint8_t>(first + same);
   piece = {static_cast<std::uint8_t>(first), static_cast<std::uint8_t>(knots.count)};
   return true;
 }

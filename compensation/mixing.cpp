@@ -37,8 +37,9 @@ bool usable(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept 
 }
 
 Real within_reason(Real demand, bool& odd) noexcept {
+  if (demand >= -kLargestDemand && demand <= kLargestDemand) return demand;
   odd = odd || is_nan(demand);
-  return is_nan(demand) ? Real(0) : std::min(std::max(demand, -kLargestDemand), kLargestDemand);
+  return demand > 0 ? kLargestDemand : demand < 0 ? -kLargestDemand : Real(0);
 }
 
 void within_reason(std::size_t i, Real low, Real high, WithinLimits::Limits& held, bool& odd) noexcept {
@@ -47,7 +48,7 @@ void within_reason(std::size_t i, Real low, Real high, WithinLimits::Limits& hel
   held.high[i] = high > held.low[i] ? std::min(high, kLargestDemand) : held.low[i];
 }
 
-bool within(const Row& thrusts, const WithinLimits::Limits& limits) noexcept {
+[[gnu::noinline]] bool within(const Row& thrusts, const WithinLimits::Limits& limits) noexcept {
   for (std::size_t i = 0; i < thrusts.size(); ++i) {
     if (!(thrusts[i] >= limits.low[i] && thrusts[i] <= limits.high[i])) return false;
   }
@@ -89,19 +90,17 @@ bool Mixer::rebuild(const RotorLayout& layout, DragTorque drag) noexcept {
       !(std::fabs(drag.per_square_newton) < Real(1e6))) {
     return false;
   }
-  const DragTorque before = drag_;
-  drag_ = drag;
-  if (set_layout(layout)) return true;
-  drag_ = before;
-  return false;
+  return set(layout, {}, drag);
 }
 
 bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale) noexcept {
+  return set(layout, drag_scale, drag_);
+}
+
+bool Mixer::set(const RotorLayout& layout, const Rotors<Real>& drag_scale, DragTorque drag) noexcept {
   const std::size_t count = layout.hubs.size();
   if (!usable(layout, drag_scale)) return false;
-  Mixer next;
-  next.drag_ = drag_;
-  next.resize(count);
+  Mixer next(count, drag);
   const Real share = 1 / static_cast<Real>(count);
   Real mean_x = 0, mean_y = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -109,38 +108,33 @@ bool Mixer::set_layout(const RotorLayout& layout, const Rotors<Real>& drag_scale
     next.y_[i] = layout.hubs[i].y.value();
     next.drag_scale_[i] = drag_scale.size() == 0 ? Real(1) : drag_scale[i];
     next.spins_[i] = static_cast<Real>(layout.spins[i]);
+    next.reach_ = std::max(next.reach_, std::max(std::fabs(next.x_[i]), std::fabs(next.y_[i])));
     mean_x += next.x_[i] * share;
     mean_y += next.y_[i] * share;
   }
-  Real reach = 0, xx = 0, xy = 0, yy = 0;  // about their mean
+  Real xx = 0, xy = 0, yy = 0;  // about their mean
   for (std::size_t i = 0; i < count; ++i) {
     const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
     xx += x * x;
     xy += x * y;
     yy += y * y;
-    reach = std::max({reach, std::fabs(x), std::fabs(y)});
   }
-  const Real determinant = xx * yy - xy * xy;
-  if (!(determinant > kFlat * reach * reach * reach * reach)) return false;
+  const Real determinant = xx * yy - xy * xy, spread = (xx + yy) / 8;  // where four are far away, the square of how far
+  if (!(determinant > kFlat * spread * spread)) return false;
   // The least squares of all thrusts that make a roll about the mean are along y and x, the thrust is 1/n of each.
   for (std::size_t i = 0; i < count; ++i) {
     const Real x = next.x_[i] - mean_x, y = next.y_[i] - mean_y;
     next.per_roll_[i] = (xx * y - xy * x) / determinant;
     next.per_pitch_[i] = (xy * y - yy * x) / determinant;
     next.per_thrust_[i] = share - mean_y * next.per_roll_[i] + mean_x * next.per_pitch_[i];
-    next.arms_[i] = next.spins_[i] * next.drag_scale_[i] * drag_.per_newton.value();
+    next.arms_[i] = next.spins_[i] * next.drag_scale_[i] * drag.per_newton.value();
   }
   next.free_ = next.torque_free(next.arms_);
+  next.arm_ = size_of(next.arms_);
   const Real square = dot(next.free_, next.free_);
-  next.yaws_ = count > kFewestRotors;
   if (next.yaws_ && !(square > kFlat * kFlat * dot(next.arms_, next.arms_))) return false;
   *this = next;
   return true;
-}
-
-void Mixer::resize(std::size_t count) noexcept {
-  for (Row* row : {&x_, &y_, &per_thrust_, &per_roll_, &per_pitch_, &arms_, &free_, &drag_scale_, &spins_})
-    *row = Row(count);
 }
 
 Real Mixer::yaw_of(const Row& thrusts, Row& slopes) const noexcept {
@@ -183,8 +177,9 @@ void Mixer::add_yaw(Row& thrusts, Real yaw, const WithinLimits::Limits& limits) 
   }
 }
 
-void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured, Row& thrusts) const noexcept {
-  const Range kept = yaw_from(assured, asked.yaw);
+void Mixer::search_yaw_and_thrust(WithinLimits& search, const Real (&asked)[4], Real assured,
+                                  Row& thrusts) const noexcept {
+  const Range kept = yaw_from(assured, asked[3]);
   const int searches = bends() ? kSearches : 1;
   Row slopes(rotors());
   for (int i = 0; i < searches; ++i) {
@@ -192,8 +187,8 @@ void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real
     const Real now = yaw_of(thrusts, slopes);
     search.set_yaw(slopes, now);
     search.reach(WithinLimits::Goal::yaw, kept);
-    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
-    search.reach(WithinLimits::Goal::yaw, {asked.yaw, asked.yaw});
+    search.reach(WithinLimits::Goal::thrust, {asked[0], asked[0]});
+    search.reach(WithinLimits::Goal::yaw, {asked[3], asked[3]});
     if (i == 0) search.ease();
     for (int j = 0; bends() && j < (i + 1 < searches ? 1 : kCorrections); ++j) {
       search.thrusts(thrusts);
@@ -202,15 +197,15 @@ void Mixer::search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real
   }
 }
 
-void Mixer::give_up(Row& thrusts, const Asked& asked, WithinLimits::Limits& held, Real assured,
+void Mixer::give_up(Row& thrusts, const Real (&asked)[4], WithinLimits::Limits& held, Real assured,
                     MixedThrusts& mixed) const noexcept {
   keep_in_reach(held, thrusts);
-  WithinLimits search(held, thrusts, x_, y_, std::max(size_of(x_), size_of(y_)));
-  search.reach_roll_pitch(asked.roll, asked.pitch);
+  WithinLimits search(held, thrusts, x_, y_, {reach_, yaws_ ? arm_ : Real(0)});
+  search.reach_roll_pitch(asked[1], asked[2]);
   if (yaws_) {
     search_yaw_and_thrust(search, asked, assured, thrusts);
   } else {
-    search.reach(WithinLimits::Goal::thrust, {asked.thrust, asked.thrust});
+    search.reach(WithinLimits::Goal::thrust, {asked[0], asked[0]});
   }
   mixed.steps = search.steps();
   mixed.concessions = mixed.concessions.with(Concession::unfinished, search.cut_short());
@@ -241,24 +236,18 @@ MixedThrusts Mixer::mix(const Wrench& demand, const Real* smallest, const Real* 
   if (yaws_) add_yaw(wanted, asked[3], held);
 
   MixedThrusts mixed;
-  if (!within(wanted, held))
-    give_up(wanted, {asked[0], asked[1], asked[2], asked[3]}, held, assured_yaw.value(), mixed);
+  if (!within(wanted, held)) give_up(wanted, asked, held, assured_yaw.value(), mixed);
   mixed.thrusts.resize(rotors());
-  Real most = 1;
-  for (std::size_t i = 0; i < rotors(); ++i) {
-    mixed.thrusts[i] = Newtons(wanted[i]);
-    most = std::max(most, std::fabs(wanted[i]));
+  for (std::size_t i = 0; i < rotors(); ++i) mixed.thrusts[i] = Newtons(wanted[i]);
+  const Real rounding = kRounding * std::max(size_of(wanted), Real(1));
+  const Wrench& got = mixed.achieved = wrench_of(wanted);
+  const Real off[] = {got.thrust.value(), got.roll.value(), got.pitch.value(), got.yaw.value()};
+  const Real arms[] = {1, reach_, reach_, arm_};
+  constexpr Concession kOf[] = {Concession::thrust, Concession::roll_pitch, Concession::roll_pitch, Concession::yaw};
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (std::fabs(off[i] - asked[i]) > rounding * arms[i]) mixed.concessions = mixed.concessions.with(kOf[i], true);
   }
-  mixed.achieved = wrench_of(wanted);
-  const Real rounding = kRounding * most, arm = rounding * std::max(size_of(x_), size_of(y_));
-  const bool thrust = std::fabs(mixed.achieved.thrust.value() - asked[0]) > rounding;
-  const bool roll_pitch = std::fabs(mixed.achieved.roll.value() - asked[1]) > arm ||
-                          std::fabs(mixed.achieved.pitch.value() - asked[2]) > arm;
-  const bool yaw = std::fabs(mixed.achieved.yaw.value() - asked[3]) > rounding * size_of(arms_);
-  mixed.concessions = mixed.concessions.with(Concession::thrust, thrust)
-                          .with(Concession::roll_pitch, roll_pitch)
-                          .with(Concession::yaw, yaw)
-                          .with(Concession::demand_nan, odd);
+  if (odd) mixed.concessions = mixed.concessions.with(Concession::demand_nan, true);
   return mixed;
 }
 

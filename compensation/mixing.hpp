@@ -105,7 +105,19 @@ class Mixer {
   [[nodiscard]] bool yaws() const noexcept { return yaws_; }
 
  private:
-  void resize(std::size_t count) noexcept;
+  Mixer(std::size_t count, DragTorque drag) noexcept
+      : drag_(drag),
+        x_(count),
+        y_(count),
+        per_thrust_(count),
+        per_roll_(count),
+        per_pitch_(count),
+        arms_(count),
+        free_(count),
+        drag_scale_(count),
+        spins_(count),
+        yaws_(count > kFewestRotors) {}
+  bool set(const RotorLayout& layout, const Rotors<Real>& drag_scale, DragTorque drag) noexcept;
   /// Of these thrusts, and by how much it changes with each [m].
   [[nodiscard]] Real yaw_of(const Row& thrusts, Row& slopes) const noexcept;
   [[nodiscard]] Wrench wrench_of(const Row& thrusts) const noexcept;
@@ -115,12 +127,10 @@ class Mixer {
   /// Adds to `thrusts` what they lack of yaw; not to the last digit where that is beyond the limits.
   void add_yaw(Row& thrusts, Real yaw, const WithinLimits::Limits& limits) const noexcept;
 
-  struct Asked {
-    Real thrust, roll, pitch, yaw;
-  };
-  void search_yaw_and_thrust(WithinLimits& search, const Asked& asked, Real assured, Row& thrusts) const noexcept;
+  // `asked`: thrust, roll, pitch, yaw [N, N m].
+  void search_yaw_and_thrust(WithinLimits& search, const Real (&asked)[4], Real assured, Row& thrusts) const noexcept;
   /// Brings `thrusts` within the limits by the order of mix(). Tells `mixed` of the search; narrows the limits.
-  void give_up(Row& thrusts, const Asked& asked, WithinLimits::Limits& held, Real assured,
+  void give_up(Row& thrusts, const Real (&asked)[4], WithinLimits::Limits& held, Real assured,
                MixedThrusts& mixed) const noexcept;
 
   DragTorque drag_{};
@@ -129,6 +139,7 @@ class Mixer {
   Row arms_, free_;                        // by what yaw changes with each thrust at rest, and its torque_free()
   Row drag_scale_;
   Row spins_;
+  Real reach_ = 0, arm_ = 0;  // the largest of x_ and y_, of arms_ [m]
   bool yaws_ = true;
 };
 

@@ -28,16 +28,8 @@ struct ContactFreeWindow {
 /// when the arm is no longer than the propeller radius: its own corner is covered then at every angle.
 [[nodiscard]] ContactFreeWindow contact_free_window(Metres half_side, Metres arm_length, Metres radius) noexcept;
 
-/// Where the hub of an arm stands beside the outline that covers it: in the body frame, on a square body turned and
-/// mirrored with the hinge, as the square looks alike from each of its corners.
-[[nodiscard]] inline HubPosition hub_beside_body(const Airframe& airframe, std::size_t arm,
-                                                 Radians arm_angle) noexcept {
-  if (airframe.polygon) return hub_at_hinge(airframe.polygon->hinges[arm], airframe.arm_length, arm_angle);
-  return hub_seen_from_hinge(airframe, arm_angle);
-}
-
-/// φ in [0, 2π] rad of this rotor's disk there, in the airframe's overlap measure. The rim over a square body by
-/// rim_arc, all else by occlusion_angle. Never NaN: 0 where an argument is.
+/// φ in [0, 2π] rad of this rotor's disk where hub_beside_body() tells, in the airframe's overlap measure. The rim over
+/// a square body by rim_arc, all else by occlusion_angle. Never NaN: 0 where an argument is.
 [[nodiscard]] Radians occlusion_beside_body(const Airframe& airframe, std::size_t rotor, HubPosition hub) noexcept;
 
 /// φ of an arm at this angle.

@@ -26,24 +26,23 @@ Real nearest(Real value, Range range) noexcept { return std::min(std::max(value,
 
 }  // namespace
 
-WithinLimits::WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Real reach) noexcept
-    : limits_(limits), rotors_(start.size()), columns_count_(start.size()), reach_(reach) {
+WithinLimits::WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Sizes sizes) noexcept
+    : limits_(limits), rotors_(start.size()), columns_count_(start.size()), sizes_(sizes) {
   Real largest = 0;
   for (std::size_t g = kMostRotors; g < kVariables; ++g) {
     low_[g] = -kFree;
     high_[g] = kFree;
-    rows_[g - kMostRotors] = static_cast<std::uint8_t>(g);
+    variables_[g - kMostRotors] = static_cast<std::uint8_t>(g);
   }
   for (std::size_t i = 0; i < columns_count_; ++i) {
     low_[i] = limits.low[i];
     high_[i] = limits.high[i];
     largest = std::max(largest, high_[i]);
-    const Real f = values_[i] = nearest(start[i], {low_[i], high_[i]});
-    entries_[0][i] = y[i] / reach;
-    entries_[1][i] = -x[i] / reach;
+    entries_[0][i] = y[i] / sizes.reach;
+    entries_[1][i] = -x[i] / sizes.reach;
     entries_[2][i] = 1;
-    for (std::size_t row = 0; row < 3; ++row) values_[kMostRotors + row] += entries_[row][i] * f;
-    columns_[i] = static_cast<std::uint8_t>(i);
+    variables_[kGoals + i] = static_cast<std::uint8_t>(i);
+    move(i, nearest(start[i], {low_[i], high_[i]}));
   }
   nothing_ = kRounding * largest;
 }
@@ -80,7 +79,8 @@ bool WithinLimits::cut_to_polygon(Real (&point)[2]) noexcept {
       }
     }
     const Real here = x * ex + y * ey, beside = here - nearest(here, {middle - half, middle + half});
-    const bool foot = !(std::fabs(beside) > 0);  // of the perpendicular, on the edge: nothing is nearer
+    // The foot of the perpendicular on the edge: nothing is nearer, whatever rounding makes of the distances.
+    const bool foot = !(std::fabs(beside) > 0);
     if (!foot && !(out * out + beside * beside < square)) continue;
     square = out * out + beside * beside;
     nx = -ey * side;
@@ -104,7 +104,7 @@ bool WithinLimits::cut_to_polygon(Real (&point)[2]) noexcept {
 }
 
 void WithinLimits::reach_roll_pitch(Real roll, Real pitch) noexcept {
-  Real point[2] = {roll / reach_, pitch / reach_};
+  Real point[2] = {roll / sizes_.reach, pitch / sizes_.reach};
   // On an edge first that of the two which changes along it.
   const std::size_t first = cut_to_polygon(point) ? 0 : 1;
   approach(kMostRotors + first, {point[first], point[first]});
@@ -119,42 +119,39 @@ void WithinLimits::reach_roll_pitch(Real roll, Real pitch) noexcept {
 void WithinLimits::forget_fixed() noexcept {
   std::size_t count = 0;
   for (std::size_t i = 0; i < rows_count_; ++i) {
-    if (rows_[i] == index(Goal::roll) || rows_[i] == index(Goal::pitch)) continue;
+    if (variables_[i] == index(Goal::roll) || variables_[i] == index(Goal::pitch)) continue;
     for (std::size_t j = 0; j < columns_count_; ++j) entries_[count][j] = entries_[i][j];
-    rows_[count++] = rows_[i];
+    variables_[count++] = variables_[i];
   }
   rows_count_ = count;
   count = 0;
   for (std::size_t j = 0; j < columns_count_; ++j) {
-    if (fixed(columns_[j])) continue;
+    if (fixed(variables_[kGoals + j])) continue;
     for (std::size_t i = 0; i < rows_count_; ++i) entries_[i][count] = entries_[i][j];
-    columns_[count++] = columns_[j];
+    variables_[kGoals + count++] = variables_[kGoals + j];
   }
   columns_count_ = count;
+  if (sizes_.yaw_arm > 0) variables_[rows_count_++] = static_cast<std::uint8_t>(index(Goal::yaw));
 }
 
 void WithinLimits::set_yaw(const Row& arms, Real now) noexcept {
   constexpr std::size_t yaw = index(Goal::yaw), thrust = index(Goal::thrust);
-  const bool first = !(yaw_scale_ > 0);
   for (std::size_t i = 0; i < rotors_; ++i) {
     low_[i] = limits_.low[i];
     high_[i] = limits_.high[i];
-    if (first) yaw_scale_ = std::max(yaw_scale_, std::fabs(arms[i]));
   }
   low_[thrust] = low_[yaw] = -kFree;
   high_[thrust] = high_[yaw] = kFree;
-  if (first) rows_[rows_count_++] = static_cast<std::uint8_t>(yaw);
   const std::size_t row = row_of(yaw);
   if (row == kGoals) return;
-  const Real unit = 1 / yaw_scale_;
-  Real scaled[kMostRotors];
-  for (std::size_t i = 0; i < rotors_; ++i) scaled[i] = arms[i] * unit;
+  const Real unit = 1 / sizes_.yaw_arm;
   for (std::size_t j = 0; j < columns_count_; ++j) {
-    Real entry = columns_[j] < kMostRotors ? scaled[columns_[j]] : Real(0);
+    const std::size_t variable = variables_[kGoals + j];
+    Real entry = variable < kMostRotors ? arms[variable] : Real(0);
     for (std::size_t i = 0; i < rows_count_; ++i) {
-      if (i != row && rows_[i] < kMostRotors) entry += scaled[rows_[i]] * entries_[i][j];
+      if (variables_[i] < kMostRotors) entry += arms[variables_[i]] * entries_[i][j];
     }
-    entries_[row][j] = entry;
+    entries_[row][j] = entry * unit;
   }
   values_[yaw] = now * unit;
 }
@@ -162,8 +159,8 @@ void WithinLimits::set_yaw(const Row& arms, Real now) noexcept {
 bool WithinLimits::correct_yaw(Real off) noexcept {
   constexpr std::size_t yaw = index(Goal::yaw);
   for (std::size_t j = 0; j < columns_count_; ++j) {
-    if (columns_[j] != yaw || !(std::fabs(off) > nothing_ * yaw_scale_)) continue;
-    Real by = off / yaw_scale_;
+    if (variables_[kGoals + j] != yaw || !(std::fabs(off) > nothing_ * sizes_.yaw_arm)) continue;
+    Real by = off / sizes_.yaw_arm;
     (void)blocking(j, by, kGoals, false);
     const Real told = values_[yaw];
     move(j, by);
@@ -174,7 +171,7 @@ bool WithinLimits::correct_yaw(Real off) noexcept {
 }
 
 void WithinLimits::reach(Goal goal, Range wanted) noexcept {
-  const Real unit = goal == Goal::yaw ? 1 / yaw_scale_ : Real(1);
+  const Real unit = goal == Goal::yaw ? 1 / sizes_.yaw_arm : Real(1);
   approach(index(goal), {wanted.low * unit, wanted.high * unit});
 }
 
@@ -200,12 +197,12 @@ void WithinLimits::approach(std::size_t goal, Range wanted) noexcept {
     const std::size_t column = entering(row, need, careful);
     if (column == columns_count_) {  // No nearer; what would take it away stays.
       for (std::size_t j = 0; j < columns_count_; ++j) {
-        if (std::fabs(entries_[row][j]) > kFlat) fix(columns_[j]);
+        if (std::fabs(entries_[row][j]) > kFlat) fix(variables_[kGoals + j]);
       }
       return;
     }
     ++steps_;
-    const std::size_t variable = columns_[column];
+    const std::size_t variable = variables_[kGoals + column];
     const Real whole = need / entries_[row][column];
     const Real own = room(variable, whole > 0), most = std::min(own, std::fabs(whole));
     Real by = whole > 0 ? most : -most;
@@ -213,11 +210,11 @@ void WithinLimits::approach(std::size_t goal, Range wanted) noexcept {
     on_the_spot = std::fabs(by) > nothing_ ? 0 : on_the_spot + 1;
     move(column, by);
     if (first < kGoals) {
-      const std::size_t met = rows_[first];
-      values_[met] = entries_[first][column] * whole > 0 ? high_[met] : low_[met];
+      const std::size_t met = variables_[first];
+      put_at_limit(met, entries_[first][column] * whole > 0);
       pivot(first, column);
     } else if (own < std::fabs(whole)) {
-      values_[variable] = whole > 0 ? high_[variable] : low_[variable];
+      put_at_limit(variable, whole > 0);
     } else {
       values_[goal] = need > 0 ? wanted.low : wanted.high;
       low_[goal] = wanted.low;
@@ -236,7 +233,7 @@ std::size_t WithinLimits::entering(std::size_t row, Real need, bool careful) con
   for (std::size_t j = 0; j < columns_count_; ++j) {
     const Real entry = entries_[row][j] * sign;
     if (!(std::fabs(entry) > most)) continue;
-    const std::size_t variable = columns_[j];
+    const std::size_t variable = variables_[kGoals + j];
     if (!(room(variable, entry > 0) > nothing_) || (careful && variable > first)) continue;
     best = j;
     if (careful) {
@@ -258,9 +255,9 @@ std::size_t WithinLimits::blocking(std::size_t column, Real& by, std::size_t but
   std::size_t first = kGoals;
   Real most = by * sign, steepest = 0, tie = 0;
   for (std::size_t i = 0; i < rows_count_; ++i) {
-    const Real entry = entries_[i][column] * sign, share = distance(rows_[i], entry), size = std::fabs(entry);
+    const Real entry = entries_[i][column] * sign, share = distance(variables_[i], entry), size = std::fabs(entry);
     // Of those that meet their limits together the one that bends the rest the least.
-    const bool better = first < kGoals && (careful ? rows_[i] < rows_[first] : size > steepest);
+    const bool better = first < kGoals && (careful ? variables_[i] < variables_[first] : size > steepest);
     if (i == but || !(share < most - tie || (better && share <= most + tie))) continue;
     most = std::min(most, share);
     steepest = size;
@@ -272,8 +269,8 @@ std::size_t WithinLimits::blocking(std::size_t column, Real& by, std::size_t but
 }
 
 void WithinLimits::move(std::size_t column, Real by) noexcept {
-  values_[columns_[column]] += by;
-  for (std::size_t i = 0; i < rows_count_; ++i) values_[rows_[i]] += entries_[i][column] * by;
+  values_[variables_[kGoals + column]] += by;
+  for (std::size_t i = 0; i < rows_count_; ++i) values_[variables_[i]] += entries_[i][column] * by;
 }
 
 void WithinLimits::pivot(std::size_t row, std::size_t column) noexcept {
@@ -284,22 +281,26 @@ void WithinLimits::pivot(std::size_t row, std::size_t column) noexcept {
     if (i == row) continue;
     const Real share = entries_[i][column];
     entries_[i][column] = 0;
-    for (std::size_t j = 0; j < columns_count_; ++j) entries_[i][j] += share * entries_[row][j];
+    std::size_t j = columns_count_;
+    do {
+      --j;
+      entries_[i][j] += share * entries_[row][j];
+    } while (j != 0);
   }
-  std::swap(rows_[row], columns_[column]);
+  std::swap(variables_[row], variables_[kGoals + column]);
 }
 
 std::size_t WithinLimits::row_of(std::size_t goal) noexcept {
   for (std::size_t i = 0; i < rows_count_; ++i) {
-    if (rows_[i] == goal) return i;
+    if (variables_[i] == goal) return i;
   }
   if (fixed(goal)) return kGoals;
   std::size_t column = 0, best = kGoals;
-  while (columns_[column] != goal) ++column;
+  while (variables_[kGoals + column] != goal) ++column;
   Real most = kFlat;
   for (std::size_t i = 0; i < rows_count_; ++i) {
     const Real size = std::fabs(entries_[i][column]);
-    if (rows_[i] >= kMostRotors || !(size > most)) continue;
+    if (variables_[i] >= kMostRotors || !(size > most)) continue;
     most = size;
     best = i;
   }
@@ -311,7 +312,7 @@ bool WithinLimits::exchange(std::size_t row) noexcept {
   std::size_t best = columns_count_;
   Real most = kFlat;
   for (std::size_t j = 0; j < columns_count_; ++j) {
-    const std::size_t variable = columns_[j];
+    const std::size_t variable = variables_[kGoals + j];
     if (fixed(variable)) continue;
     const bool between = room(variable, true) > nothing_ && room(variable, false) > nothing_;
     const Real worth = std::fabs(entries_[row][j]) * (between ? 1 : Real(0.1));
@@ -327,16 +328,16 @@ bool WithinLimits::exchange(std::size_t row) noexcept {
 void WithinLimits::ease() noexcept {
   // Conjugate gradients over the columns that may move, anew from each limit that is met.
   const Real eased = nothing_ * (kEased / kRounding);
-  Real way[kMostRotors] = {}, before = 0;
+  Real way[kVariables] = {}, before = 0;  // of the rows and, from kGoals on, the columns
   for (int step = 0; step < kEasings; ++step) {
     Real slopes[kMostRotors], square = 0;
     for (std::size_t j = 0; j < columns_count_; ++j) {
-      const std::size_t variable = columns_[j];
+      const std::size_t variable = variables_[kGoals + j];
       slopes[j] = 0;
       if (variable >= kMostRotors || fixed(variable)) continue;
       Real slope = values_[variable];
       for (std::size_t i = 0; i < rows_count_; ++i) {
-        if (rows_[i] < kMostRotors) slope += entries_[i][j] * values_[rows_[i]];
+        if (variables_[i] < kMostRotors) slope += entries_[i][j] * values_[variables_[i]];
       }
       if (!(room(variable, slope < 0) > nothing_)) continue;
       slopes[j] = slope;
@@ -346,34 +347,32 @@ void WithinLimits::ease() noexcept {
     ++steps_;
     const Real share = before > 0 ? square / before : Real(0);
     // Down the way to its lowest point, or to the first limit.
-    Real down = 0, bend = 0, rows_way[kGoals] = {};
+    Real down = 0, bend = 0;
+    for (std::size_t i = 0; i < rows_count_; ++i) way[i] = 0;
     for (std::size_t j = 0; j < columns_count_; ++j) {
-      const Real here = way[j] = share * way[j] - slopes[j];
+      const Real here = way[kGoals + j] = share * way[kGoals + j] - slopes[j];
       if (!(std::fabs(here) > 0)) continue;
       down -= slopes[j] * here;
       bend += here * here;
-      for (std::size_t i = 0; i < rows_count_; ++i) rows_way[i] += entries_[i][j] * here;
+      for (std::size_t i = 0; i < rows_count_; ++i) way[i] += entries_[i][j] * here;
     }
     for (std::size_t i = 0; i < rows_count_; ++i) {
-      if (rows_[i] < kMostRotors) bend += rows_way[i] * rows_way[i];
+      if (variables_[i] < kMostRotors) bend += way[i] * way[i];
     }
     const Real whole = down / bend;
     Real by = whole;
-    std::size_t row = kGoals;
-    for (std::size_t j = 0; j < columns_count_; ++j) by = std::min(by, distance(columns_[j], way[j]));
-    for (std::size_t i = 0; i < rows_count_; ++i) {
-      const Real most = distance(rows_[i], rows_way[i]);
+    std::size_t first = kVariables;
+    for (std::size_t k = kGoals + columns_count_; k-- > 0;) {
+      const Real most = distance(variables_[k], way[k]);
       if (!(most < by)) continue;
       by = most;
-      row = i;
+      first = k;
     }
-    for (std::size_t j = 0; j < columns_count_; ++j) values_[columns_[j]] += by * way[j];
-    for (std::size_t i = 0; i < rows_count_; ++i) values_[rows_[i]] += by * rows_way[i];
-    before = by < whole ? Real(0) : square;
-    if (row == kGoals) continue;
-    const std::size_t met = rows_[row];
-    values_[met] = rows_way[row] > 0 ? high_[met] : low_[met];
-    if (!exchange(row)) return;
+    for (std::size_t k = 0; k < kGoals + columns_count_; ++k) values_[variables_[k]] += by * way[k];
+    before = first < kVariables ? Real(0) : square;
+    if (first >= kGoals) continue;
+    put_at_limit(variables_[first], way[first] > 0);
+    if (!exchange(first)) return;
   }
   cut_short_ = true;
 }

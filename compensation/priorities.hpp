@@ -49,9 +49,14 @@ class WithinLimits {
   };
   enum class Goal : std::uint8_t { roll, pitch, thrust, yaw };
 
+  struct Sizes {
+    Real reach;    ///< the largest of all x and y [m]
+    Real yaw_arm;  ///< about the largest of the arms of set_yaw() [m]; 0: there is no yaw
+  };
+
   /// Begins at `start`, cut to the limits, which must live as long as this and are narrowed by it. The rotors are at
-  /// (`x`, `y`) [m], roll = y·f, pitch = −x·f; `reach` is the largest of them [m]. There is no yaw before set_yaw().
-  WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Real reach) noexcept;
+  /// (`x`, `y`) [m], roll = y·f, pitch = −x·f. There is no yaw before set_yaw().
+  WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Sizes sizes) noexcept;
 
   /// (roll, pitch) come as near to these [N m] as can be, in the sum of squares, and stay there.
   void reach_roll_pitch(Real roll, Real pitch) noexcept;
@@ -68,7 +73,7 @@ class WithinLimits {
   /// Into `result`, which has as many rotors.
   void thrusts(Row& result) const noexcept;
   /// By the arms of set_yaw() [N m].
-  [[nodiscard]] Real yaw() const noexcept { return values_[index(Goal::yaw)] * yaw_scale_; }
+  [[nodiscard]] Real yaw() const noexcept { return values_[index(Goal::yaw)] * sizes_.yaw_arm; }
   /// Of the search so far; its beginning is one.
   [[nodiscard]] int steps() const noexcept { return steps_; }
   /// Whether a search ended at its bound of steps: a goal may come nearer than it is, or the thrusts be smaller.
@@ -77,7 +82,7 @@ class WithinLimits {
   static constexpr int kMostSteps = 24;
 
  private:
-  // A variable is a rotor's thrust (0 to 7) or a goal (8 to 11), in newtons: torques by reach_ and yaw_scale_. The
+  // A variable is a rotor's thrust (0 to 7) or a goal (8 to 11), in newtons: torques by sizes_. The
   // variables of the rows are told by those of the columns: value = sum of entry times value.
   static constexpr std::size_t kGoals = 4, kVariables = kMostRotors + kGoals;
   struct Move {
@@ -95,17 +100,20 @@ class WithinLimits {
   void fix(std::size_t variable) noexcept { low_[variable] = high_[variable] = values_[variable]; }
   /// If the rotors cannot make this roll and pitch, moves it to the nearest that they can and fixes those whose limits
   /// make it. Whether roll changes more than pitch along the edge there.
-  bool cut_to_polygon(Real (&point)[2]) noexcept;
+  inline bool cut_to_polygon(Real (&point)[2]) noexcept;
   /// Leaves out the rows and columns that will not change any more.
-  void forget_fixed() noexcept;
+  inline void forget_fixed() noexcept;
   void approach(std::size_t goal, Range wanted) noexcept;
   /// The column that moves `row` by `need` the fastest; columns_count_ if none can.
-  [[nodiscard]] std::size_t entering(std::size_t row, Real need, bool careful) const noexcept;
+  [[nodiscard]] inline std::size_t entering(std::size_t row, Real need, bool careful) const noexcept;
   /// How far until the variable, which changes by `change` of it, is at its limit.
   [[nodiscard]] Real distance(std::size_t variable, Real change) const noexcept;
   /// The first row whose limit a move of this column by `by` meets, which it cuts; kGoals if none.
   [[nodiscard]] std::size_t blocking(std::size_t column, Real& by, std::size_t but, bool careful) const noexcept;
   void move(std::size_t column, Real by) noexcept;
+  void put_at_limit(std::size_t variable, bool upper) noexcept {
+    values_[variable] = upper ? high_[variable] : low_[variable];
+  }
   /// The variables of this row and this column change places.
   void pivot(std::size_t row, std::size_t column) noexcept;
   /// Of a goal that can still change, made a row if it was a column; kGoals if it cannot.
@@ -117,8 +125,8 @@ class WithinLimits {
   std::size_t rotors_, columns_count_, rows_count_ = 3;
   Real values_[kVariables] = {}, low_[kVariables], high_[kVariables];
   Real entries_[kGoals][kMostRotors];
-  std::uint8_t rows_[kGoals], columns_[kMostRotors];
-  Real reach_, yaw_scale_ = 0;
+  std::uint8_t variables_[kVariables];  // of the rows and, from kGoals on, of the columns
+  Sizes sizes_;
   Real nothing_;  // a change of thrust that is rounding [N]
   int steps_ = 1;
   bool cut_short_ = false;

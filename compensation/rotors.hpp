@@ -18,7 +18,7 @@ class Rotors {
   constexpr Rotors() noexcept = default;
   /// Of a vehicle with `count` rotors; more than kMostRotors count as that many.
   constexpr explicit Rotors(std::size_t count, const T& each = T()) noexcept
-      : values_(padded(std::array<T, 1>{{each}}, std::make_index_sequence<kMostRotors>())),
+      : values_(filled(each, std::make_index_sequence<kMostRotors>())),
         count_(static_cast<std::uint32_t>(count < kMostRotors ? count : kMostRotors)) {}
   template <std::size_t N>
   constexpr Rotors(const std::array<T, N>& values) noexcept  // NOLINT: the way in
@@ -50,6 +50,10 @@ class Rotors {
   }
 
  private:
+  template <std::size_t... I>
+  static constexpr std::array<T, kMostRotors> filled(const T& each, std::index_sequence<I...>) noexcept {
+    return {{(static_cast<void>(I), each)...}};
+  }
   template <std::size_t N, std::size_t... I>
   static constexpr std::array<T, kMostRotors> padded(const std::array<T, N>& values,
                                                      std::index_sequence<I...>) noexcept {

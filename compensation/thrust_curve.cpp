@@ -9,31 +9,21 @@ namespace {
 
 constexpr Real kUnknown = std::numeric_limits<Real>::infinity();
 
-bool positive(Real value) noexcept { return is_finite(value) && value > 0; }
-
 bool not_negative(Real value) noexcept { return is_finite(value) && value >= 0; }
 
-/// Positive, and not rising.
-bool may_be_k(const KnotList& knots) noexcept {
-  Real least = knots[0].value;
+/// Of k: positive, and not rising. Of a torque share: in (0, kMostTorque).
+bool fit(const KnotList& knots, bool falling) noexcept {
+  Real most = falling ? std::numeric_limits<Real>::max() : kMostTorque * (1 - std::numeric_limits<Real>::epsilon());
   for (std::size_t i = 0; i < knots.count; ++i) {
     const Real value = knots[i].value;
-    if (!(value > 0 && value <= least)) return false;
-    least = value;
-  }
-  return true;
-}
-
-bool may_be_torque(const KnotList& knots) noexcept {
-  for (std::size_t i = 0; i < knots.count; ++i) {
-    const Real value = knots[i].value;
-    if (!(value > 0 && value < kMostTorque)) return false;
+    if (!(value > 0 && value <= most)) return false;
+    if (falling) most = value;
   }
   return true;
 }
 
 bool sound(const SpeedTrend& trend) noexcept {
-  return positive(trend.reference.value()) && is_finite(trend.per_rad_s) &&
+  return is_positive(trend.reference.value()) && is_finite(trend.per_rad_s) &&
          std::fabs(trend.per_rad_s * trend.reference.value()) <= SpeedTrend::kMost;
 }
 
@@ -55,14 +45,14 @@ Real scaling_factor_of(Real k, Real thrust_coefficient, Radians occlusion_angle,
 }
 
 bool sound(const CurveParts& parts) noexcept {
-  if (!positive(parts.largest_fitted.value()) || parts.largest_fitted.value() > 2 * kPi) return false;
-  if (parts.overlap > OverlapMeasure::load_share || !positive(parts.thrust_coefficient.value())) return false;
+  if (!is_positive(parts.largest_fitted.value()) || parts.largest_fitted.value() > 2 * kPi) return false;
+  if (parts.overlap > OverlapMeasure::load_share || !is_positive(parts.thrust_coefficient.value())) return false;
   if (parts.k.count == 0) {
-    if (!positive(parts.intercept.value()) || !is_finite(parts.slope_per_rad)) return false;
-  } else if (!sound(parts.k) || !may_be_k(parts.k)) {
+    if (!is_positive(parts.intercept.value()) || !is_finite(parts.slope_per_rad)) return false;
+  } else if (!sound(parts.k) || !fit(parts.k, true)) {
     return false;
   }
-  if (parts.torque.count != 0 && (!sound(parts.torque) || !may_be_torque(parts.torque))) return false;
+  if (parts.torque.count != 0 && (!sound(parts.torque) || !fit(parts.torque, false))) return false;
   const bool trend = is_nan(parts.speed_trend.per_rad_s) || std::fabs(parts.speed_trend.per_rad_s) > 0;
   return !trend || sound(parts.speed_trend);
 }
@@ -96,7 +86,7 @@ bool ThrustCurve::set_speed_trend(const SpeedTrend& trend) noexcept {
 }
 
 bool ThrustCurve::set_torque_share(const OcclusionTable& share) noexcept {
-  if (!may_be_torque(share.list())) return false;
+  if (!fit(share.list(), false)) return false;
   torque_share_ = share;
   return true;
 }
@@ -106,8 +96,12 @@ std::optional<ThrustCurve> ThrustCurve::perturbed(ThrustCoefficient raised, Real
   result.line_.intercept = line_.intercept + raised;
   result.line_.slope_per_rad = line_.slope_per_rad * steepness;
   if (!table_.empty()) result.table_ = table_.moved(table_.begin()->value + raised.value(), steepness);
-  return positive(result.at(Radians(0)).value()) && is_finite(steepness) ? std::optional<ThrustCurve>(result)
-                                                                         : std::nullopt;
+  return is_positive(result.at(Radians(0)).value()) && is_finite(steepness) ? std::optional<ThrustCurve>(result)
+                                                                            : std::nullopt;
+}
+
+Real SpeedTrend::factor_at(Real speed) const noexcept {
+  return std::min(1 + kMost, std::max(1 - kMost, 1 + per_rad_s * (speed - reference.value())));
 }
 
 Real SpeedTrend::speed_for(Real plain) const noexcept {

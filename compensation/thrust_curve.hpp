@@ -51,9 +51,7 @@ struct SpeedTrend {
   Real per_rad_s = 0;   ///< 0: k does not depend on the speed
   RadPerSec reference;  ///< where k is k(φ) [rad/s], positive
 
-  [[nodiscard]] Real factor_at(Real speed) const noexcept {
-    return std::min(1 + kMost, std::max(1 - kMost, 1 + per_rad_s * (speed - reference.value())));
-  }
+  [[nodiscard]] Real factor_at(Real speed) const noexcept;
   /// The speed [rad/s] with the thrust that `plain` would have without the trend. Within 1e-9 of itself where k changes
   /// by a fifth up to there; in double.
   [[nodiscard]] Real speed_for(Real plain) const noexcept;

@@ -37,6 +37,17 @@ using Real = double;
   std::memcpy(&bits, &value, sizeof bits);
   return (bits & 0x7FF0000000000000u) != 0x7FF0000000000000u;
 }
+/// Finite and above 0, by its bits.
+[[nodiscard]] inline bool is_positive(const float& value) noexcept {
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits - 1 < 0x7F7FFFFFu;
+}
+[[nodiscard]] inline bool is_positive(const double& value) noexcept {
+  std::uint64_t bits = 0;
+  std::memcpy(&bits, &value, sizeof bits);
+  return bits - 1 < 0x7FEFFFFFFFFFFFFFu;
+}
 
 inline constexpr Real kPi = Real(3.14159265358979323846);
 

@@ -25,7 +25,7 @@ std::string about_keypad(Bench& bench) {
 }
 
 MountConfirmation ask_at_the_stand(Bench& bench, Operator& person, const std::function<bool()>& stop_asked,
-                                   const std::function<MountConfirmation(const std::string& condition)>& ask) {
+                                   const std::function<MountConfirmation(const StandAtRest& stand)>& ask) {
   const StandAtRest stand(bench, stop_asked);
   struct Waiting {
     explicit Waiting(Operator& asked, std::function<void()> poll) : person(asked) {
@@ -35,7 +35,7 @@ MountConfirmation ask_at_the_stand(Bench& bench, Operator& person, const std::fu
     Operator& person;
   };
   std::optional<Waiting> waiting(std::in_place, person, [&] { stand.check(); });
-  const MountConfirmation confirmed = ask(stand.condition());
+  const MountConfirmation confirmed = ask(stand);
   waiting.reset();
   stand.check();
   if (stop_asked()) throw Interrupted("stopped by request");

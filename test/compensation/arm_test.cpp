@@ -44,6 +44,16 @@ TEST_P(OnArm, CallsTakeAsManyInstructionsStackAndMemoryAsPromised) {
     RecordProperty(build.type + std::string("_code"), static_cast<int>(board.code_bytes()));
     EXPECT_GT(board.code_bytes(), 5'000);
     EXPECT_LE(board.code_bytes(), build.code);
+
+    // The page tells the same, but for the longest of many more searches.
+    const Figures found = OnBoard::figures_of(counts, board.code_bytes()), told = figures_told(GetParam(), build);
+    SCOPED_TRACE(row_of(GetParam(), build, found));
+    for (const Column column : {kCode, kKept, kDeepest, kSetArmsInO, kMixAndSpeeds})
+      EXPECT_NEAR(found[column], told[column], 0.01 * told[column]) << column;
+    for (const Column column : {kLongest, kLongestCurved}) {
+      EXPECT_LE(found[column], 1.01 * told[column]) << column;
+      EXPECT_LE(told[column], build.longest_search) << column;
+    }
   }
 }
 

@@ -362,9 +362,7 @@ TEST(CompensatorBuild, IsRefusedWhereALineWasFittedWithAnotherMeasure) {
 }
 
 TEST(CompensatorBuild, DoubtsALineThatStepsAtContactOrGainsWithOcclusion) {
-  const auto doubts = [](const ThrustCurve& line, ScalingLaw law) {
-    return build_with(line, example_airframe(), law).doubts[0];
-  };
+  const auto doubts = doubts_about;
   EXPECT_FALSE(doubts(paper_line(), ScalingLaw::clamped).steps_at_contact);
   EXPECT_TRUE(doubts(paper_line(), ScalingLaw::published).steps_at_contact);
   EXPECT_TRUE(doubts(example_line(0.95, -0.002), ScalingLaw::clamped).steps_at_contact);

@@ -72,7 +72,7 @@ TEST(Properties, PhiIsContinuousInTheArmAngle) {
     const Airframe airframe = draw.airframe();
     const double theta = draw.between(-kPi / 2, kPi), r = airframe.propeller_radius.value();
     const auto arc = [&](double angle) {
-      const HubPosition hub = hub_seen_from_hinge(airframe, Radians(angle));
+      const HubPosition hub = hub_beside_body(airframe, 0, Radians(angle));
       return rim_arc(airframe.half_side, airframe.propeller_radius, hub.x, hub.y).value();
     };
     // A strip as wide as the hub moves holds at most so much rim, on each of four edges: the root at tangency.
@@ -83,7 +83,7 @@ TEST(Properties, PhiIsContinuousInTheArmAngle) {
          {std::pair{OverlapMeasure::area_share, 2.0}, {OverlapMeasure::load_share, 3.0}}) {
       const auto share = [&, by = measure](double angle) {
         return occlusion_angle(ConvexPolygon::square(airframe.half_side), airframe.propeller_radius,
-                               hub_seen_from_hinge(airframe, Radians(angle)), by)
+                               hub_beside_body(airframe, 0, Radians(angle)), by)
             .value();
       };
       ASSERT_NEAR(share(theta), share(theta + kStep), weight * 2 * kPi * moved / r + 1e-12);

@@ -1,8 +1,11 @@
 // The library built for a microcontroller as firmware would build it, run under qemu, counted and weighed.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <sstream>
 #include <stdexcept>
@@ -18,19 +21,56 @@ namespace kphi::test {
 struct Processor {
   const char* name;   ///< as gcc calls it
   const char* board;  ///< as qemu calls it
+  const char* said;   ///< as README.md calls it
 };
-inline constexpr Processor kM4f{"cortex-m4", "mps2-an386"}, kM7{"cortex-m7", "mps2-an500"};
+inline constexpr Processor kM4f{"cortex-m4", "mps2-an386", "M4F"}, kM7{"cortex-m7", "mps2-an500", "M7"};
 
-/// What the library takes in a build, of which the first is the one to fly: the bounds that README.md tells.
+/// What the library may take in a build, of which the first is the one to fly.
 struct Build {
   const char* type;  ///< of CMake's
   int code, set_arms_o, mix_and_speeds_for, longest_search;
 };
-inline constexpr Build kBuilds[] = {{"MinSizeRel", 15'600, 3'200, 1'500, 25'000},
-                                    {"RelWithDebInfo", 18'400, 3'200, 1'500, 25'000},
-                                    {"Release", 38'000, 3'200, 1'500, 22'000}};
+inline constexpr Build kBuilds[] = {{"MinSizeRel", 14'000, 3'200, 1'500, 25'000},
+                                    {"RelWithDebInfo", 16'500, 3'200, 1'500, 22'000},
+                                    {"Release", 33'000, 3'200, 1'500, 22'000}};
 /// In every one of them, for four rotors as for eight [bytes].
 inline constexpr int kStack = 1024, kCompensatorBytes = 2048;
+
+/// What it takes: the columns of the table in compensation/README.md. Code, memory and stack in bytes, then
+/// instructions.
+enum Column { kCode, kKept, kDeepest, kSetArmsInO, kMixAndSpeeds, kLongest, kLongestCurved };
+using Figures = std::array<int, 7>;
+
+/// As a row of that table begins.
+inline std::string beginning_of_row(const Processor& processor, const Build& build) {
+  return std::string("| ") + processor.said + " | `" + build.type + "` |";
+}
+
+inline std::string row_of(const Processor& processor, const Build& build, const Figures& figures) {
+  std::string row = beginning_of_row(processor, build);
+  for (const int figure : figures) {
+    std::string digits = std::to_string(figure);
+    if (digits.size() > 3) digits.insert(digits.size() - 3, ",");
+    row += " " + digits + " |";
+  }
+  return row;
+}
+
+/// What the page tells. Throws if it has no such row.
+inline Figures figures_told(const Processor& processor, const Build& build) {
+  std::ifstream page(source_dir() + "/compensation/README.md");
+  const std::string beginning = beginning_of_row(processor, build);
+  for (std::string line; std::getline(page, line);) {
+    if (line.rfind(beginning, 0) != 0) continue;
+    line.erase(std::remove(line.begin(), line.end(), ','), line.end());
+    std::istringstream fields(line.substr(beginning.size()));
+    Figures figures{};
+    char bar = 0;
+    for (int& figure : figures) fields >> figure >> bar;
+    if (fields) return figures;
+  }
+  throw std::runtime_error("compensation/README.md has no row " + beginning);
+}
 
 /// What is missing to build and run; empty: nothing.
 inline std::string missing_for_boards() {
@@ -67,6 +107,19 @@ class OnBoard {
     std::string name;
     for (int count = 0; lines >> name >> count;) counts[name] = count;
     return counts;
+  }
+  [[nodiscard]] static Figures figures_of(const std::map<std::string, int>& counts, long code_bytes) {
+    int deepest = 0;
+    for (const auto& [name, count] : counts) {
+      if (name.rfind("stack_", 0) == 0) deepest = std::max(deepest, count);
+    }
+    return {static_cast<int>(code_bytes),
+            counts.at("bytes_compensator") + counts.at("bytes_mixer"),
+            deepest,
+            counts.at("set_arms_o"),
+            counts.at("mix_and_speeds_for"),
+            counts.at("longest_search"),
+            counts.at("longest_search_curved")};
   }
   /// What the classes' calls link of the library: its code without its C interface and the compiler's mathematics.
   [[nodiscard]] long code_bytes() const {

@@ -81,15 +81,13 @@ class Px4 : public testing::Test {
     return wrench;
   }
   /// What PX4's own multirotor makes of this demand, in X: what its pilot and its gains are used to.
-  Outputs own_outputs(const Demand& demand) {
-    px4::Multirotor own({{0.1277F, -0.1277F, kFull, -kDrag},
-                         {-0.1277F, -0.1277F, kFull, kDrag},
-                         {-0.1277F, 0.1277F, kFull, -kDrag},
-                         {0.1277F, 0.1277F, kFull, kDrag}});
-    px4::ControlAllocator allocator(own);
+  Outputs own_outputs(const Demand& demand, const px4::Parameters& parameters = {}) {
+    px4::ControlAllocator allocator(multirotor, parameters);
     return allocator.run(demand, 0.01);
   }
-  Eigen::Vector4f own_wrench(const Demand& demand) { return wrench_of(own_outputs(demand), kX); }
+  Eigen::Vector4f own_wrench(const Demand& demand, const px4::Parameters& parameters = {}) {
+    return wrench_of(own_outputs(demand, parameters), kX);
+  }
 
   void arms(const float* angles) { child.armsMeasured(angles, kStill, 0); }
   /// Arms measured and in PX4's matrix.
@@ -105,6 +103,10 @@ class Px4 : public testing::Test {
 
   MorphingVehicle of = vehicle();
   ActuatorEffectivenessMorphing child;
+  px4::Multirotor multirotor{{{0.1277F, -0.1277F, kFull, -kDrag},
+                              {-0.1277F, -0.1277F, kFull, kDrag},
+                              {-0.1277F, 0.1277F, kFull, -kDrag},
+                              {0.1277F, 0.1277F, kFull, kDrag}}};
   double now = 0;
 };
 
@@ -175,15 +177,57 @@ TEST_F(Px4, KeepsItsThrustsBetweenTwoMatrices) {
               own_wrench(demand_of(0.25F, 0, 0, 0))[0], 1e-4);
 }
 
-TEST_F(Px4, SaturatesAsTheStacksOwnMultirotorInX) {
-  px4::ControlAllocator allocator(child);
-  fly(allocator, kX);
+TEST_F(Px4, SaturatesInEachAirmodeAndAtASlewRateAsTheStacksOwnMultirotorInX) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> axis(-1, 1), up(0, 1.2F);
-  for (int i = 0; i < 2000; ++i) {
-    const Demand demand = demand_of(up(random), axis(random), axis(random), axis(random));
-    expect_near(allocator.run(demand, now), own_outputs(demand), 1e-4F);
+  for (const px4::Parameters& parameters : {px4::Parameters{0, 0}, {1, 0}, {2, 0}, {0, 0.05F}, {1, 0.05F}}) {
+    px4::ControlAllocator allocator(child, parameters), beside(multirotor, parameters);
+    arms(kX);
+    for (int i = 0; i < 3; ++i) {
+      allocator.run(kDemands[0], now += 0.2);
+      beside.run(kDemands[0], now);
+    }
+    for (int i = 0; i < 1000; ++i) {
+      const Demand demand = demand_of(up(random), axis(random), axis(random), axis(random));
+      now += 0.004;
+      expect_near(allocator.run(demand, now), beside.run(demand, now), 1e-4F);
+    }
   }
+}
+
+TEST_F(Px4, KeepsRollAndPitchInOWhereAirmodeLetsThrustRise) {
+  const Demand demand = demand_of(0.02F, 0.06F, -0.05F, 0);
+  for (const int airmode : {0, 1, 2}) {
+    px4::ControlAllocator allocator(child, {airmode, 0});
+    fly(allocator, kO);
+    const Eigen::Vector4f got = wrench_of(allocator.run(demand, now), kO), wanted = own_wrench(demand, {1, 0});
+    if (airmode == 0) {
+      EXPECT_LT(got[1], 0.9F * wanted[1]) << "without airmode roll is given up";
+      continue;
+    }
+    EXPECT_NEAR(got[1], wanted[1], 2e-4F);
+    EXPECT_NEAR(got[2], wanted[2], 2e-4F);
+    EXPECT_GT(got[0], own_wrench(demand_of(0.02F, 0, 0, 0))[0]);
+  }
+}
+
+TEST_F(Px4, ObeysASlewRateWhileItsArmsMoveAndStopsAtTheEndOfIt) {
+  const float slew = 0.05F, step = 0.004F;
+  px4::ControlAllocator allocator(child, {0, slew});
+  fly(allocator, kX);
+  Outputs before = allocator.run(kDemands[1], now += step);
+  for (int i = 0; i < 200; ++i) {
+    const float share = static_cast<float>(i) / 200, moving[4] = {kX[0] + share * (kO[0] - kX[0]), kX[1], kO[2], kO[3]};
+    arms(moving);
+    const Outputs outputs = allocator.run(i % 20 < 10 ? kDemands[3] : kDemands[1], now += step);
+    EXPECT_LE((outputs - before).cwiseAbs().maxCoeff(), step / slew + 1e-6F);
+    before = outputs;
+  }
+  int steps = 0;
+  while (!allocator.run(demand_of(kNaN, 0, 0, 0), now += step).array().isNaN().all() && steps < 100) ++steps;
+  EXPECT_GT(steps, 2) << "they sink first";
+  EXPECT_LT(steps, 13);
+  EXPECT_LE(allocator.run(kDemands[1], now += step).maxCoeff(), step / slew + 1e-6F) << "and rise from nothing";
 }
 
 TEST_F(Px4, SaturatedInOGivesThrustUpBeforeRollAndPitch) {
