@@ -59,7 +59,9 @@ class Stand {
   Stand(const std::string& scale, const std::string& esc, const char* supply)
       : scale_(scale), esc_(esc), plant_({}, 1) {
     if (supply == nullptr) return;
-    supply_.emplace(sim::SupplySettings{.model = "RD6024", .faults = {}});
+    sim::SupplySettings settings;
+    settings.model = "RD6024";
+    supply_.emplace(settings);
     supply_line_.emplace(sim::SupplyAddresses{supply, std::nullopt});
     plant_.power([this](double amps, double siemens) { return supply_->advance({amps, siemens}, now()); });
   }
