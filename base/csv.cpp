@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <deque>
 
 #include "base/error.hpp"
 #include "base/number.hpp"
@@ -29,30 +30,51 @@ std::string_view next_line(std::string_view& rest) {
   return line;
 }
 
-/// The quoted field at the front of `rest` into `field`; false if its closing quote is missing.
-bool take_quoted(std::string_view& rest, std::string& field) {
-  field.clear();
-  for (std::size_t i = 1; i < rest.size(); ++i) {
-    if (rest[i] != '"') {
-      field += rest[i];
-    } else if (i + 1 < rest.size() && rest[i + 1] == '"') {
-      field += rest[i++];
-    } else {
-      rest.remove_prefix(i + 1);
-      return true;
+/// The fields of one line, as views of it; what a doubled quote makes of a field is kept here.
+class Fields {
+ public:
+  void clear() { views_.clear(), mended_ = 0; }
+  void add(std::string_view field) { views_.push_back(field); }
+  /// Room for a field that is not as it stands in the line, until the next clear().
+  std::string& mended() {
+    if (mended_ == texts_.size()) texts_.emplace_back();
+    std::string& text = texts_[mended_++];
+    text.clear();
+    return text;
+  }
+  [[nodiscard]] const std::vector<std::string_view>& views() const { return views_; }
+  void pop_back() { views_.pop_back(); }
+
+ private:
+  std::vector<std::string_view> views_;
+  std::deque<std::string> texts_;  // which do not move
+  std::size_t mended_ = 0;
+};
+
+/// The quoted field at the front of `rest`; false if its closing quote is missing.
+bool take_quoted(std::string_view& rest, Fields& fields) {
+  std::string* mended = nullptr;
+  for (std::size_t i = 1, begin = 1; i < rest.size(); ++i) {
+    if (rest[i] != '"') continue;
+    const bool doubled = i + 1 < rest.size() && rest[i + 1] == '"';
+    if (doubled && mended == nullptr) mended = &fields.mended();
+    if (mended != nullptr) mended->append(rest.substr(begin, i - begin + (doubled ? 1 : 0)));
+    if (doubled) {
+      begin = ++i + 1;
+      continue;
     }
+    fields.add(mended != nullptr ? std::string_view(*mended) : rest.substr(1, i - 1));
+    rest.remove_prefix(i + 1);
+    return true;
   }
   return false;
 }
 
-using Fields = std::vector<std::string>;
-
-/// The fields of the line, in the memory of those of the line before.
 bool split_blanks(std::string_view line, Fields& fields) {
   fields.clear();
   while (!(line = trimmed(line)).empty()) {
     const auto end = static_cast<std::size_t>(std::ranges::find_if(line, is_blank) - line.begin());
-    fields.emplace_back(line.substr(0, end));
+    fields.add(line.substr(0, end));
     line.remove_prefix(end);
   }
   return true;
@@ -60,34 +82,32 @@ bool split_blanks(std::string_view line, Fields& fields) {
 
 /// The same; false if its quotes do not close, or text follows a closing quote.
 bool split_separated(std::string_view line, char separator, Fields& fields) {
-  for (std::size_t count = 1;; ++count) {
-    if (fields.size() < count) fields.emplace_back();
-    std::string& field = fields[count - 1];
+  fields.clear();
+  for (;;) {
     if (!line.empty() && line.front() == '"') {
-      if (!take_quoted(line, field) || (!line.empty() && line.front() != separator)) return false;
+      if (!take_quoted(line, fields) || (!line.empty() && line.front() != separator)) return false;
     } else {
       const std::size_t end = std::min(line.find(separator), line.size());
-      field = trimmed(line.substr(0, end));
+      fields.add(trimmed(line.substr(0, end)));
       line.remove_prefix(end);
     }
-    if (line.empty()) {
-      fields.resize(count);
-      return true;
-    }
+    if (line.empty()) return true;
     line.remove_prefix(1);
   }
 }
 
+std::vector<std::string> kept(const Fields& fields) { return {fields.views().begin(), fields.views().end()}; }
+
 /// A row with the header's number of fields, a trailing empty one taken off; otherwise the problem goes into the table.
-void take_row(Table& table, TableRow& row, const TakeRow& take) {
-  if (row.fields.size() == table.header.size() + 1 && row.fields.back().empty()) row.fields.pop_back();
-  if (row.fields.size() != table.header.size()) {
-    table.problems.push_back({row.line, fmt::format("{} fields where the header has {}; line skipped",
-                                                    row.fields.size(), table.header.size())});
+void take_row(Table& table, std::size_t line, Fields& fields, const TakeRow& take) {
+  if (fields.views().size() == table.header.size() + 1 && fields.views().back().empty()) fields.pop_back();
+  if (fields.views().size() != table.header.size()) {
+    table.problems.push_back({line, fmt::format("{} fields where the header has {}; line skipped",
+                                                fields.views().size(), table.header.size())});
   } else if (take) {
-    take(table, row);
+    take(table, {line, fields.views()});
   } else {
-    table.rows.push_back(row);
+    table.rows.push_back({line, kept(fields)});
   }
 }
 
@@ -96,16 +116,16 @@ class TableReader {
  public:
   /// After `line` lines of a table that may have its header.
   TableReader(Table begin, std::size_t line, const TakeRow& take) : table_(std::move(begin)), take_(take) {
-    row_.line = line;
+    line_ = line;
   }
 
   /// Of a block of whole lines.
   void read(std::string_view lines, const auto& split, std::string_view comment = {}) {
     while (!lines.empty() && !given_up_) {
-      ++row_.line;
+      ++line_;
       const std::string_view line = next_line(lines), content = trimmed(line);
       if (content.empty() || (!comment.empty() && content.starts_with(comment))) continue;
-      take_line(split(line, row_.fields));
+      take_line(split(line, fields_));
     }
   }
 
@@ -117,25 +137,26 @@ class TableReader {
     if (table_.header_line == 0) {
       take_header(closed);
     } else if (closed) {
-      take_row(table_, row_, take_);
+      take_row(table_, line_, fields_, take_);
     } else {
-      table_.problems.push_back({row_.line, "a quoted field is not closed; line skipped"});
+      table_.problems.push_back({line_, "a quoted field is not closed; line skipped"});
     }
   }
 
   void take_header(bool closed) {
-    table_.header_line = row_.line;
+    table_.header_line = line_;
     given_up_ = !closed;
     if (!closed) {
-      table_.problems.push_back({row_.line, "a quoted field of the header is not closed"});
+      table_.problems.push_back({line_, "a quoted field of the header is not closed"});
       return;
     }
-    table_.header = row_.fields;
+    table_.header = kept(fields_);
     if (table_.header.size() > 1 && table_.header.back().empty()) table_.header.pop_back();
   }
 
   Table table_;
-  TableRow row_;  ///< the memory of the line at hand
+  std::size_t line_ = 0;
+  Fields fields_;  ///< of the line at hand
   const TakeRow& take_;
   bool given_up_ = false;
 };
@@ -168,7 +189,7 @@ std::size_t Table::column(std::string_view name) const {
 std::optional<std::vector<std::string>> split_csv_line(std::string_view line, char separator) {
   Fields fields;
   const bool closed = separator == ' ' ? split_blanks(line, fields) : split_separated(line, separator, fields);
-  return closed ? std::optional(std::move(fields)) : std::nullopt;
+  return closed ? std::optional(kept(fields)) : std::nullopt;
 }
 
 char likely_separator(std::string_view text) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,12 @@ namespace kphi {
 struct TableRow {
   std::size_t line = 0;  ///< in the file, 1-based
   std::vector<std::string> fields;
+};
+
+/// The same in the text that is read, while it is there.
+struct RowView {
+  std::size_t line = 0;
+  std::span<const std::string_view> fields;
 };
 
 struct TableProblem {
@@ -38,7 +45,7 @@ struct Table {
 /// A byte order mark, CRLF and a trailing empty field on each line are accepted; a field may be in double quotes, a
 /// quote in it doubled. Empty lines are skipped. Separator 0: the one of , ; tab that the header line has most of.
 /// With `take` each row is handed over, with the table so far, and not kept.
-using TakeRow = std::function<void(const Table&, const TableRow&)>;
+using TakeRow = std::function<void(const Table&, const RowView&)>;
 [[nodiscard]] Table read_csv(TextBlocks text, std::string path, char separator = ',', const TakeRow& take = {});
 
 /// Rows of a block of whole lines of a table that is known by `begin`, its header and path; `line`: the number of the

@@ -110,6 +110,9 @@ inline constexpr std::array<const char*, 7> kSupplyProtectionNames{
   return kSupplyProtectionNames[static_cast<std::size_t>(protection)];
 }
 
+/// The keys of a supply while it is asked; said_free: it says so, though its maker's own firmware locks them.
+enum class SupplyKeypad : std::uint8_t { free, locked, said_free };
+
 /// One reading of the bench supply. Codes are those of the run file. A trip or a period of constant current between two
 /// readings is not seen.
 struct SupplyReading {

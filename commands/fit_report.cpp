@@ -25,6 +25,7 @@
 #include "fit/signal/blade_pass.hpp"
 #include "fit/signal/dynamics.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "profiles/stand_drawing.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/run_reader.hpp"
@@ -64,10 +65,17 @@ void write_page(const fs::path& page, const std::string& html) {
   fmt::print(stderr, "report        {}\n", page.string());
 }
 
+/// Of a campaign's stand; empty without one.
+std::string drawing_of(const FitInput& input) {
+  if (!input.measured_by) return {};
+  return profiles::draw_stand(profiles::sketch_of(input.measured_by->propeller, input.bench.iq.spin),
+                              input.measured_by->occlusions_deg);
+}
+
 /// `apart`: how the names of page and figures begin, apart from those of the campaign in the same folder.
 void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {}) {
   const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"));
-  write_page(page, format_report(fitted, {input.provenance, figures}));
+  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input)}));
 }
 
 struct FitRequest {
@@ -264,18 +272,6 @@ ExitCode refused_or_ok(const FitRequest& request, const Fitted& fitted) {
   return ExitCode::data_rejected;
 }
 
-/// Of a log without occlusions: K_T with its budget and a report, but nothing to fly with.
-ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, const Fitted& fitted) {
-  if (!request.out.empty())
-    throw ConfigurationError(request.path +
-                             ": no occlusion was measured, so no coefficient file can be written; "
-                             "leave --out away");
-  print_findings(request, input, fitted, {});
-  fmt::print(stderr, "{}", caution_text(fitted.identification, fitted.analysis));
-  if (!request.no_report) write_report(fitted, input, input.folder / "report.html");
-  return refused_or_ok(request, fitted);
-}
-
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
   if (!input.table.empty())
@@ -300,7 +296,6 @@ ExitCode run_fit(const FitRequest& request) {
   if (input.table.empty()) input.provenance.bench = options.bench;
   if (options.bench.calibration_note.empty()) input.provenance.cell_weighed.clear();
   fitted.analysis = analyse(identification, options);
-  if (identification.alone()) return run_without_occlusions(request, input, fitted);
   fs::create_directories(folder);
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);

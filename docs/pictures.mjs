@@ -1,4 +1,4 @@
-// Makes the pictures of the README: a campaign of the simulated bench in a browser, and the first figure of its report.
+// Makes the pictures of the README: a campaign of the simulated bench in a browser, the first figure of its report, the stand.
 //   node pictures.mjs KPHI NODE_MODULES_PARENT FOLDER   (./run pictures)
 // With ALL=1 also the states that nobody prints: before the first run, stopped, on a telephone, dark.
 import { spawn } from 'node:child_process';
@@ -71,6 +71,7 @@ try {
   const report = await browser.newPage({ viewport: { width: 1100, height: 800 }, deviceScaleFactor: 1 });
   await report.goto(`file://${path.join(work, results, 'report.html')}`);
   await report.locator('figure').first().screenshot({ path: path.join(folder, 'report.png') });
+  await report.locator('figure.stand svg').screenshot({ path: path.join(folder, 'stand.png') });
   if (all) {
     await report.screenshot({ path: path.join(folder, 'report_page.png'), fullPage: true });
     await report.pdf({ path: path.join(folder, 'report.pdf'), format: 'A4' });

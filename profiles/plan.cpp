@@ -84,7 +84,7 @@ Plan make_plan(const Campaign& campaign, const BenchConfig& bench) {
   plan.mountings = static_cast<int>(plan.mounting_angles().size());
   plan.mounts_more = campaign.repetitions_most && campaign.order.remount_each_repetition;
   plan.spinning = campaign.profile.dwell * plan.steps + ramps;
-  plan.bench = plan.spinning + campaign.zero * ((campaign.box_bias ? 4.0 : 2.0) * runs);
+  plan.bench = plan.spinning + campaign.zero * ((campaign.box_bias ? 4.0 : 2.0) * runs) + kSpinDown * runs;
   plan.samples = static_cast<std::uint64_t>(std::llround(plan.bench.value() * bench.netbox.rate_hz));
   return plan;
 }

@@ -30,6 +30,9 @@ struct PlannedRun {
   [[nodiscard]] bool is_reference() const { return repetition < 0; }
 };
 
+/// From the last step until the rotor is at rest, as a small propeller coasts from its top speed.
+inline constexpr Seconds kSpinDown{3.5};
+
 /// Where repetitions is a range: the least that there can be.
 struct Plan {
   std::vector<PlannedRun> runs;  ///< in the order in which they are run
@@ -37,7 +40,7 @@ struct Plan {
   bool mounts_more = false;      ///< more mountings may follow: repetitions is a range, and each is remounted
   int steps = 0;                 ///< in all runs
   Seconds spinning;              ///< motor on: steps, and ramps between them
-  Seconds bench;                 ///< spinning, zeros and biases; without mounting, cooling, spinning down
+  Seconds bench;                 ///< spinning, zeros, biases and spinning down; without mounting and cooling
   std::uint64_t samples = 0;     ///< of the Net Box at the bench's rate, zeros included
 
   /// The occlusions that a person is asked to mount, in order, degrees.

@@ -32,9 +32,9 @@ void write_file(const std::filesystem::path& path, FileLayer& files) {
   files.sync_data(file.number());
 }
 
-std::vector<Finding> refused(const std::filesystem::path& parent, const std::string& why) {
-  return {{Severity::fault, fmt::format("{}: no run can be kept here: {}", parent.string(), why),
-           "choose another folder with --out"}};
+std::vector<Finding> refused(const std::filesystem::path& parent, const std::string& why,
+                             const std::string& next = "choose another folder with --out") {
+  return {{Severity::fault, fmt::format("{}: no run can be kept here: {}", parent.string(), why), next}};
 }
 
 /// As a run becomes a finished one.
@@ -77,7 +77,7 @@ std::vector<Finding> try_disk(const std::filesystem::path& parent, FileLayer& fi
   } catch (const std::system_error& error) {
     return refused(parent, error.what());
   } catch (const RecordError& error) {
-    return refused(parent, error.what());
+    return refused(parent, error.what(), "");  // it says what to do
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <stdexcept>
@@ -152,18 +153,38 @@ void append_quoted(std::string& line, const std::string& text) {
   line += '"';
 }
 
-struct Append {
-  const StepMean& step;
-  std::string& line;
-  void operator()(std::string StepMean::*m) const { append_quoted(line, step.*m); }
-  void operator()(auto StepMean::*m) const {
-    const fmt::format_int digits(step.*m);
+/// One column's fields. Most of a log repeat from row to row: those are written again, not formatted again.
+class FieldText {
+ public:
+  explicit FieldText(const StepColumn& column) : field_(column.field) {}
+  void append(const StepMean& step, std::string& line) {
+    std::visit([&](auto member) { append_member(step.*member, line); }, field_);
+  }
+
+ private:
+  void append_member(const std::string& text, std::string& line) { append_quoted(line, text); }
+  void append_member(std::uint32_t flags, std::string& line) {
+    if (flags != 0) line += quality_flag_names(flags);
+  }
+  void append_member(double value, std::string& line) {
+    if (std::isnan(value)) return;
+    const auto bits = std::bit_cast<std::uint64_t>(value);
+    if (bits != bits_ || text_.empty()) {
+      text_.clear();
+      append_shortest(text_, value);
+      bits_ = bits;
+    }
+    line += text_;
+  }
+  template <class Whole>
+  void append_member(Whole value, std::string& line) {
+    const fmt::format_int digits(value);
     line.append(digits.data(), digits.size());
   }
-  void operator()(double StepMean::*m) const {
-    if (!std::isnan(step.*m)) append_shortest(line, step.*m);
-  }
-  void operator()(std::uint32_t StepMean::*m) const { line += quality_flag_names(step.*m); }
+
+  Field field_;
+  std::uint64_t bits_ = 0;
+  std::string text_;  ///< of the double with these bits; empty before the first
 };
 
 template <class Value>
@@ -174,7 +195,7 @@ Value required(std::optional<Value> value, const char* problem) {
 
 struct Parse {
   StepMean& step;
-  const std::string& text;
+  std::string_view text;
   void operator()(std::string StepMean::*m) const { step.*m = text; }
   void operator()(int StepMean::*m) const { step.*m = required(parse_integer<int>(text), "is not a whole number"); }
   void operator()(std::uint64_t StepMean::*m) const {
@@ -186,9 +207,9 @@ struct Parse {
   void operator()(std::uint32_t StepMean::*m) const { step.*m = quality_flags_from_names(text); }
 };
 
-void append_row(std::string& text, const StepMean& step, const Columns& columns) {
-  for (const StepColumn& column : columns) {
-    std::visit(Append{step, text}, column.field);
+void append_row(std::string& text, const StepMean& step, std::vector<FieldText>& fields) {
+  for (FieldText& field : fields) {
+    field.append(step, text);
     text += ',';
   }
   text.back() = '\n';
@@ -222,7 +243,9 @@ void format_to(const StepSource& steps, const std::function<void(std::string_vie
       steps.count,
       [&](std::size_t begin, std::size_t end) {
         std::string text;
-        for (std::size_t i = begin; i < end; ++i) append_row(text, steps.step(i), columns);
+        std::vector<FieldText> fields(columns.begin(), columns.end());
+        text.reserve((end - begin) * 128);
+        for (std::size_t i = begin; i < end; ++i) append_row(text, steps.step(i), fields);
         return text;
       },
       sink);
@@ -245,7 +268,7 @@ Columns columns_named(const std::vector<std::string>& names) {
   return columns;
 }
 
-StepMean step_from(const std::vector<std::string>& fields, const Columns& columns) {
+StepMean step_from(std::span<const std::string_view> fields, const Columns& columns) {
   StepMean step;
   step.zero_n = kNotMeasured;  // unless there is the column
   for (std::size_t i = 0; i < fields.size(); ++i) {
@@ -329,7 +352,7 @@ std::vector<StepMean> parse_steps(std::string_view text, const std::string& name
     if (!columns) columns = columns_named(table.header);
   };
   try {
-    follow(read_csv(text, name, ',', [&](const Table& table, const TableRow& row) {
+    follow(read_csv(text, name, ',', [&](const Table& table, const RowView& row) {
       follow(table);
       line = row.line;
       steps.push_back(step_from(row.fields, *columns));

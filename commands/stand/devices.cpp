@@ -172,7 +172,7 @@ bool may_switch_on(const DevicesRequest& asked, const profiles::SupplyConfig& su
   Terminal terminal(STDIN_FILENO, stderr);
   put(stderr,
       fmt::format(
-          "The supply's output is off, so the motor cannot answer. Nothing will turn, but it will have {:g} V.\n",
+          "The supply's output is off, and the motor does not answer. Nothing will turn, but it will have {:g} V.\n",
           supply.voltage.value()));
   const auto answer = terminal.ask(
       "Type on and press Enter to switch it on and off again, or only Enter:", [] {}, [] {});
@@ -326,11 +326,11 @@ DeviceAnswer ask_any_motor(const DevicesRequest& asked, const profiles::BenchCon
     return bench.motor ? ask_other_motor(bench, clock)
                        : ask_motor(bench.iq, clock, asked.clock_gain_s, powered, stop_asked);
   };
-  if (!unpowered) return ask(true, [] { return false; });
+  // A board that has another supply answers all the same.
+  DeviceAnswer answer = ask(!unpowered, [] { return false; });
+  if (answer.answers || !unpowered) return answer;
   if (may_switch_on(asked, *bench.supply))
     return ask_with_power(bench, clock, [&](const StopAsked& stop_asked) { return ask(false, stop_asked); });
-  DeviceAnswer answer = ask(false, [] { return false; });
-  if (answer.answers) return answer;
   answer.wanted = asked.clock_gain_s.has_value();
   answer.says = "without power";
   answer.findings.clear();

@@ -49,8 +49,8 @@ class SupplyLink {
   virtual std::size_t take(std::span<SupplyReading> out) = 0;
   /// Why the link failed; empty while it works. Thread-safe.
   [[nodiscard]] virtual std::string failure() const = 0;
-  /// Nobody can switch it off by its keys while it is asked.
-  [[nodiscard]] virtual bool locks_keypad() const { return false; }
+  /// Where it is not free, nobody should count on its output key.
+  [[nodiscard]] virtual SupplyKeypad keypad() const { return SupplyKeypad::free; }
   /// Bench time that the longest reading so far took; 0: unknown, or none to speak of. Thread-safe.
   [[nodiscard]] virtual Duration longest_reading() const noexcept { return Duration(0); }
   /// Output off. Thread-safe; does not wait.

@@ -1,5 +1,7 @@
 #include "daq/campaign/at_the_stand.hpp"
 
+#include <fmt/format.h>
+
 namespace kphi::daq {
 
 StandAtRest::StandAtRest(Bench& bench, const std::function<bool()>& stop_asked) {
@@ -16,12 +18,14 @@ std::string StandAtRest::condition() const {
 }
 
 std::string about_keypad(Bench& bench) {
-  if (bench.supply() == nullptr || !bench.supply()->locks_keypad()) return "";
-  return " The supply's keypad is locked while kphi asks it: your switch for the 12 V is another one.";
+  const auto keypad = bench.supply() == nullptr ? SupplyKeypad::free : bench.supply()->keypad();
+  if (keypad == SupplyKeypad::free) return "";
+  return fmt::format(" The supply's keypad {} locked while kphi asks it: your switch for the 12 V is another one.",
+                     keypad == SupplyKeypad::locked ? "is" : "may be");
 }
 
 MountConfirmation ask_at_the_stand(Bench& bench, Operator& person, const std::function<bool()>& stop_asked,
-                                   const std::function<MountConfirmation(const std::string& condition)>& ask) {
+                                   const std::function<MountConfirmation(const StandAtRest& stand)>& ask) {
   const StandAtRest stand(bench, stop_asked);
   struct Waiting {
     explicit Waiting(Operator& asked, std::function<void()> poll) : person(asked) {
@@ -31,7 +35,7 @@ MountConfirmation ask_at_the_stand(Bench& bench, Operator& person, const std::fu
     Operator& person;
   };
   std::optional<Waiting> waiting(std::in_place, person, [&] { stand.check(); });
-  const MountConfirmation confirmed = ask(stand.condition());
+  const MountConfirmation confirmed = ask(stand);
   waiting.reset();
   stand.check();
   if (stop_asked()) throw Interrupted("stopped by request");

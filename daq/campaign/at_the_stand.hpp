@@ -19,6 +19,8 @@ class StandAtRest {
   StandAtRest(Bench& bench, const std::function<bool()>& stop_asked);
   /// Throws SafetyStop once the rotor turned, or could. Any thread.
   void check() const { guard_->check(); }
+  /// The motor, as far as kphi knows.
+  [[nodiscard]] bool has_power() const { return has_power_; }
   /// One sentence on motor and supply, for whoever comes near.
   [[nodiscard]] std::string condition() const;
 
@@ -30,10 +32,9 @@ class StandAtRest {
 /// For a person who comes near for the first time: that the supply's keys switch nothing; empty: they may.
 [[nodiscard]] std::string about_keypad(Bench& bench);
 
-/// Asks while the stand is at rest. `ask` gets the sentence of its condition. Throws SafetyStop, Interrupted, and what
-/// `ask` throws.
-[[nodiscard]] MountConfirmation ask_at_the_stand(
-    Bench& bench, Operator& person, const std::function<bool()>& stop_asked,
-    const std::function<MountConfirmation(const std::string& condition)>& ask);
+/// Asks while the stand is at rest. Throws SafetyStop, Interrupted, and what `ask` throws.
+[[nodiscard]] MountConfirmation ask_at_the_stand(Bench& bench, Operator& person,
+                                                 const std::function<bool()>& stop_asked,
+                                                 const std::function<MountConfirmation(const StandAtRest& stand)>& ask);
 
 }  // namespace kphi::daq

@@ -113,6 +113,15 @@ int CampaignReview::repetitions(double occlusion_deg) const {
   return found == repetitions_.end() ? 0 : found->second;
 }
 
+std::string CampaignReview::k_words(double occlusion_deg, int repetition) const {
+  for (const results::RepetitionVerdict& verdict : results::judge_repetitions(steps_)) {
+    for (const results::RepetitionFigure& figure : verdict.repetitions)
+      if (verdict.occlusion_deg == occlusion_deg && figure.repetition == repetition && std::isfinite(figure.k))
+        return fmt::format("k {:.4e} N/(rad/s)², ", figure.k);
+  }
+  return "";
+}
+
 std::optional<AnotherRun> CampaignReview::another(double occlusion_deg) {
   const int made = repetitions(occlusion_deg);
   if (made < campaign_.repetitions) return std::nullopt;

@@ -37,6 +37,8 @@ class CampaignReview {
   [[nodiscard]] std::optional<AnotherRun> another(double occlusion_deg);
   /// Repetitions of the occlusion so far, reference runs not counted.
   [[nodiscard]] int repetitions(double occlusion_deg) const;
+  /// "k 1.5632e-06, ", N/(rad/s)², of this run; empty if too few of its steps are good, and of a reference run.
+  [[nodiscard]] std::string k_words(double occlusion_deg, int repetition) const;
   /// Of all runs so far but the reference runs.
   [[nodiscard]] const std::vector<results::StepMean>& steps() const { return steps_; }
   [[nodiscard]] const SpeedCap& cap() const { return cap_; }

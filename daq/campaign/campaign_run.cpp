@@ -17,6 +17,7 @@
 #include "daq/guard/run_stopped.hpp"
 #include "daq/run/run.hpp"
 #include "profiles/plan.hpp"
+#include "profiles/stand_drawing.hpp"
 #include "profiles/strict_yaml.hpp"
 #include "results/journal.hpp"
 #include "results/reduction/reduction.hpp"
@@ -200,8 +201,10 @@ class CampaignRun {
     const auto file = file_of(planned);
     const double planned_s = plan_.bench.value() / static_cast<double>(plan_.runs.size());
     const Instant begun = bench_.clock().now();
-    // This one may take all that is planned; those after it as long as the one before, if runs end by themselves.
-    const double remaining_s = planned_s + last_run_s_.value_or(planned_s) * (planned_ - result_.runs - 1);
+    // Where runs end by themselves, each takes as long as the one before.
+    const double expected_s = last_run_s_.value_or(planned_s);
+    const double later_s = expected_s * (planned_ - result_.runs - 1);
+    promise(expected_s + later_s, later_s);
     profiles::PlannedRun capped = planned;
     review_.cap().apply(capped.steps);
     try {
@@ -213,11 +216,14 @@ class CampaignRun {
                            config_,
                            *mounted_,
                            capped,
-                           remaining_s,
+                           expected_s,
+                           !last_run_s_,
+                           later_s,
                            file,
                            nullptr,
                            static_cast<int>(result_.runs) + 1,
-                           static_cast<int>(planned_)};
+                           static_cast<int>(planned_),
+                           result_.samples};
       (void)keep(&Bench::keep_prompt, "may_be_late");  // asked for again by the run itself: only to tell a refusal
       const RunResult recorded = record_run(bench_, order, progress_, stop_asked_);
       if (campaign_.profile.until) last_run_s_ = to_seconds(bench_.clock().now() - begun);
@@ -229,6 +235,13 @@ class CampaignRun {
                                           {"safety_stop", is_safety_stop(cause)}});
       throw;
     }
+  }
+
+  /// Time left never grows without a word.
+  void promise(double left_s, double after_this_run_s) {
+    const double longer_s = to_seconds(bench_.clock().shrunk(from_seconds(left_s - promised_s_.value_or(left_s))));
+    if (longer_s > 1) progress_.say(fmt::format("time left: {:.0f} s more than said before", longer_s));
+    promised_s_ = after_this_run_s;
   }
 
   /// Once all repetitions are there: adds runs while they disagree and the operator agrees, or the campaign says so.
@@ -249,7 +262,8 @@ class CampaignRun {
   bool ask_for_another(const AnotherRun& question) {
     const RestGuard guard(bench_, true);
     person_.while_waiting([&] { guard.check(); });
-    progress_.asks(fmt::format("Run {:g}° again? {}", question.occlusion_deg, question.reason));
+    progress_.asks(
+        {fmt::format("Run {:g}° again? {}", question.occlusion_deg, question.reason), question.occlusion_deg});
     const Answered answered(progress_);
     const bool yes = person_.run_again(question);
     person_.while_waiting({});
@@ -323,20 +337,22 @@ class CampaignRun {
     explicit Answered(Progress& progress) : progress_(progress) {}
     Answered(const Answered&) = delete;
     Answered& operator=(const Answered&) = delete;
-    ~Answered() { progress_.asks(""); }
+    ~Answered() { progress_.asks({}); }
 
    private:
     Progress& progress_;
   };
 
   MountConfirmation let_mount(double occlusion_deg) {
-    progress_.asks(occlusion_deg == 0 ? "Take the occlusion off, then type 0."
-                                      : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg));
-    const Answered answered(progress_);
-    return ask_at_the_stand(bench_, person_, stop_asked_, [&](const std::string& condition) {
+    return ask_at_the_stand(bench_, person_, stop_asked_, [&](const StandAtRest& stand) {
+      progress_.asks({occlusion_deg == 0 ? "Take the occlusion off, then type 0."
+                                         : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg),
+                      occlusion_deg, stand.has_power(),
+                      draw_plates(profiles::sketch_of(campaign_.propeller, config_.iq.spin), {occlusion_deg})});
+      const Answered answered(progress_);
       const bool first = !std::exchange(has_asked_, true);
       return person_.confirm_mounting(campaign_.propeller, occlusion_deg,
-                                      condition + (first ? about_keypad(bench_) : ""));
+                                      stand.condition() + (first ? about_keypad(bench_) : ""));
     });
   }
 
@@ -365,8 +381,9 @@ class CampaignRun {
     const results::FlaggedSteps flagged = count(run.file, recording, means);
     review_.write(folder_, bench_.files());
     for (const std::string& reason : zero.reasons()) progress_.say("load cell: " + reason);
-    progress_.say(fmt::format("run {:2}/{}  {}  {} samples, {} lost, {}{}{}", result_.runs, planned_,
-                              run.file.filename().string(), run.account.received, lost, results::in_words(flagged),
+    progress_.say(fmt::format("run {:2}/{}  {}  {}{} samples, {} lost, {}{}{}", result_.runs, planned_,
+                              run.file.filename().string(), review_.k_words(planned.occlusion_deg, planned.repetition),
+                              run.account.received, lost, results::in_words(flagged),
                               run.steps_not_needed > 0 ? fmt::format(", {} not needed", run.steps_not_needed) : "",
                               rest_words(run.stop)));
     if (!so_far_ || planned.is_reference()) return;
@@ -418,6 +435,7 @@ class CampaignRun {
   std::set<std::string> accepted_;    ///< names of files
   Instant accepted_at_{0};            ///< the last of them
   std::optional<double> last_run_s_;  ///< bench time of the last run, where steps end by themselves
+  std::optional<double> promised_s_;  ///< bench time that was left after the last run
   std::optional<MountConfirmation> mounted_;
   bool has_asked_ = false;         ///< for a mounting
   std::set<std::string> refused_;  ///< what this computer did not grant; the operator was told

@@ -334,8 +334,8 @@ std::string to_text(const DryRun& dry, const Campaign& campaign, const profiles:
   const double slew_s = ramp_time(campaign.profile, dry.plan.runs.front()).value();
   const profiles::Plan most = longest_plan(campaign, config);
   return fmt::format(
-      "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with the zeros; plus mounting (waits for you), "
-      "spinning down{}{}\n\nchecks: {}\n{}\nthe motor coasts when the guard sees:\n  {}\n",
+      "{}\n\norder: {}\n{}\ntime: {} spinning{}, {} on the bench with zeros and spinning down; plus mounting (waits "
+      "for you){}{}\n\nchecks: {}\n{}\nthe motor coasts when the guard sees:\n  {}\n",
       plan_text(campaign, config, dry.plan), profiles::to_words(campaign.order), runs_text(dry.plan, campaign),
       (campaign.profile.until ? "at most " : "") + minutes(most.spinning.value()),
       slew_s > 0 ? fmt::format(" ({} of ramps in the first run)", minutes(slew_s)) : "", minutes(most.bench.value()),

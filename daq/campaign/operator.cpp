@@ -6,6 +6,7 @@
 #include "base/number.hpp"
 #include "base/text.hpp"
 #include "daq/run/console.hpp"
+#include "profiles/stand_drawing.hpp"
 
 namespace kphi::daq {
 namespace {
@@ -25,13 +26,13 @@ std::string understood(const std::string& typed) {
 }
 
 void TerminalOperator::ask(std::string about, const std::string& question, const std::string& retort,
-                           const std::function<bool(const std::string& answer)>& accept) {
+                           const std::function<bool(const std::string& answer)>& accept, const std::string& drawing) {
   const auto poll_all = [this] {
     if (stop_asked_()) throw Interrupted("stopped at the prompt");
     poll();
   };
   for (;; about.clear()) {
-    if (!about.empty()) put(words_, fmt::format("\n{}\n", about));
+    if (!about.empty()) put(words_, fmt::format("\n{}\n{}", about, drawing));
     const auto [line, took] = terminal_.ask(
         question, [&] { asked(about.empty() ? question : about + " " + question); }, poll_all);
     answered(line.value_or("(no more input)"), took);
@@ -82,13 +83,17 @@ void TerminalOperator::accept_doubts(const std::string& doubts) {
 void TerminalOperator::mount(const profiles::Propeller& propeller, double occlusion_deg, const std::string& condition) {
   const std::string what =
       occlusion_deg == 0 ? std::string("no occlusion") : fmt::format("the {:g}° occlusion", occlusion_deg);
-  ask(fmt::format("{}{}Mount {} under propeller {} ({}). Step back.", condition, condition.empty() ? "" : "\n", what,
+  ask(
+      fmt::format("{}{}Mount {} under propeller {} ({}). Step back.", condition, condition.empty() ? "" : "\n", what,
                   propeller.id, propeller.name),
       fmt::format("Type the mounted angle in degrees ({:g}) and press Enter, or q to stop:", occlusion_deg),
-      fmt::format("You typed \"{{}}\"; this run needs {:g} degrees.\n", occlusion_deg), [&](const std::string& answer) {
+      fmt::format("You typed \"{{}}\"; this run needs {:g} degrees.\n", occlusion_deg),
+      [&](const std::string& answer) {
         if (answer == "q") throw NotMounted(fmt::format("mounting of {:g}° not confirmed", occlusion_deg));
         return parse_double(answer) == occlusion_deg;
-      });
+      },
+      fmt::format("\n    {}\n\n    from above: # plate, . free part of the disk\n\n",
+                  fmt::join(profiles::plate_in_characters(occlusion_deg), "\n    ")));
 }
 
 bool TerminalOperator::run_again(const AnotherRun& question) {

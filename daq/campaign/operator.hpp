@@ -125,9 +125,9 @@ class TerminalOperator final : public Operator {
 
  private:
   /// Asks until `accept` takes the answer; "q" at the end of the input. `about` explains the question and is printed
-  /// the first time, `retort` ("You typed "{}"…") before it is asked again.
+  /// the first time, with a `drawing` that is not recorded, `retort` ("You typed "{}"…") before it is asked again.
   void ask(std::string about, const std::string& question, const std::string& retort,
-           const std::function<bool(const std::string& answer)>& accept);
+           const std::function<bool(const std::string& answer)>& accept, const std::string& drawing = "");
   Terminal& terminal_;
   std::FILE* words_;
   std::function<bool()> stop_asked_;

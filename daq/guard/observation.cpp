@@ -71,10 +71,9 @@ void Observer::take(const LoadCellRecord& sample) {
   load_.add(sample);
   if (vibration_.add(sample.counts, newest_.speed_rad_s)) newest_.vibration = vibration_.newest();
   for (std::size_t axis = 0; axis < 6; ++axis) tell(static_cast<Watched>(axis), load_.load(axis));
-  if (!load_.full()) return;
+  if (!load_.full() || !has_zero_) return;
   newest_.thrust_n = load_.thrust() - thrust_zero_;
   newest_.torque_nm = mounting_.sign * (load_.shaft_torque() - torque_zero_);
-  if (!has_zero_) return;
   tell(Watched::thrust, std::abs(newest_.thrust_n));
   tell(Watched::shaft_torque, std::abs(newest_.torque_nm));
 }

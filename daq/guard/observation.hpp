@@ -30,8 +30,8 @@ struct GuardedValues {
 /// The newest of everything. Members are eight bytes or multiples: the guard publishes it as a whole.
 struct Readings {
   GuardedValues judged;
-  double thrust_n = 0;                         ///< zero subtracted, signed; mean of 5 ms
-  double torque_nm = 0;                        ///< likewise, about the thrust axis
+  double thrust_n = kUnknown;                  ///< zero subtracted, signed; mean of 5 ms; kUnknown before a zero
+  double torque_nm = kUnknown;                 ///< likewise, about the thrust axis
   double speed_rad_s = 0;                      ///< unsigned
   double drive_pwm = 0;                        ///< share of the supply voltage that drives the motor, -1..1
   double derate = 1;                           ///< share of its drive that the module allows itself; 1: all

@@ -18,7 +18,7 @@ class LiveSupply final : public SupplyLink {
   [[nodiscard]] const std::optional<LastWord>& off() const { return worker_.identity().off; }
   std::size_t take(std::span<SupplyReading> out) override { return worker_.take(out); }
   [[nodiscard]] std::string failure() const override;
-  [[nodiscard]] bool locks_keypad() const override { return worker_.identity().locks_keypad; }
+  [[nodiscard]] SupplyKeypad keypad() const override { return worker_.identity().keypad; }
   [[nodiscard]] Duration longest_reading() const noexcept override { return worker_.longest_look(); }
   void cut() noexcept override { worker_.switch_off(); }
   [[nodiscard]] std::string switch_off() noexcept override;

@@ -66,9 +66,13 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
                                     identity.voltage_max_v, identity.current_max_a, volts, amps),
                         "lower voltage_v and current_limit_a, or use a larger supply"});
   }
-  if (identity.locks_keypad)
-    findings.push_back({Severity::note, "its keypad is locked while kphi asks it: its output key is no switch for you",
-                        "have another switch for the 12 V within reach"});
+  if (identity.keypad != SupplyKeypad::free)
+    findings.push_back(
+        {Severity::note,
+         identity.keypad == SupplyKeypad::locked
+             ? "its keypad is locked while kphi asks it: its output key is no switch for you"
+             : "its maker's firmware locks the keypad while kphi asks it; this one says that it does not",
+         "have another switch for the 12 V within reach"});
   if (reading.protection != SupplyProtection::none) {
     findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(reading.protection)),
                         "find the cause; switching the output on clears it"});

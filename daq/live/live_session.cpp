@@ -44,10 +44,8 @@ void LiveProgress::tick(const Position& position, const Observation& seen) {
   inner_.tick(position, seen);
   const Instant now = clock_.now();
   add_to_step(position, seen, now);
-  most_remaining_s_ = std::max(most_remaining_s_, position.remaining_s);
-  const double progress = most_remaining_s_ > 0 ? 1 - position.remaining_s / most_remaining_s_ : 0;
   const std::chrono::duration<double> epoch = clock_.epoch_utc().time_since_epoch();
-  const Tick tick{to_seconds(now), epoch.count() + to_seconds(clock_.shrunk(now)), progress, position, seen};
+  const Tick tick{to_seconds(now), epoch.count() + to_seconds(clock_.shrunk(now)), position, seen};
   feed_.show(tick);
   if (plotter_ != nullptr) plotter_->send(tick);
 }
@@ -69,7 +67,7 @@ void LiveProgress::reached(const std::string& words) {
   feed_.tell(reached_message(words));
 }
 
-void LiveProgress::asks(const std::string& question) {
+void LiveProgress::asks(const StandQuestion& question) {
   inner_.asks(question);
   feed_.tell(ask_message(question));
 }

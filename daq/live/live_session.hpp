@@ -39,7 +39,7 @@ class LiveProgress final : public Progress {
   void tick(const Position& position, const Observation& seen) override;
   void step_done(const Position& position, const Observation& seen) override;
   void say(const std::string& line) override;
-  void asks(const std::string& question) override;
+  void asks(const StandQuestion& question) override;
   void reached(const std::string& words) override;
 
  private:
@@ -53,7 +53,6 @@ class LiveProgress final : public Progress {
   QuickLook quick_look_;
   int step_ = -1;
   Instant step_began_{};
-  double most_remaining_s_ = 0;
 };
 
 struct LiveOptions {

@@ -67,11 +67,12 @@ std::string tick_message(const Tick& tick, double silent_s, std::uint64_t droppe
   const Position& at = tick.position;
   ordered_json message{{"type", "tick"},
                        {"time_s", tick.time_s},
-                       {"progress", rounded(tick.progress)},
+                       {"progress", rounded(at.done)},
                        {"remaining_s", rounded(at.remaining_s)},
                        {"propeller", at.propeller.data()},
                        {"phase", at.step < 0 ? at.phase : std::string_view()}};
   KPHI_JSON_MEMBERS(message, at, step, steps, occlusion_deg, repetition, repetitions, run, runs);
+  message["samples"] = at.samples_before + tick.seen.account.received;
   add_readings(message, tick);
   for (const double rms : tick.seen.vibration.rms) message["vibration"].push_back(rounded(rms, 4));
   message["blade_pass_hz"] = rounded(tick.seen.vibration.blade_pass_hz, 6);
@@ -104,8 +105,10 @@ Message reached_message(const std::string& text) {
   return {Message::Kind::other, text_of({{"type", "reached"}, {"text", text}})};
 }
 
-Message ask_message(const std::string& text) {
-  return {Message::Kind::other, text_of({{"type", "ask"}, {"text", text}})};
+Message ask_message(const StandQuestion& question) {
+  ordered_json message{{"type", "ask"}};
+  KPHI_JSON_MEMBERS(message, question, text, occlusion_deg, has_power, drawing);
+  return {Message::Kind::other, text_of(message)};
 }
 
 Message stop_message(double time_s) { return {Message::Kind::other, text_of({{"type", "stop"}, {"time_s", time_s}})}; }

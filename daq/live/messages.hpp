@@ -7,14 +7,16 @@
 //   limits   the guard's limits from now on: limits [{key, name, unit, limit, lower (bool), source}]
 //   tick     30 times a second: time_s, progress (0 to 1), remaining_s, propeller, phase ("" in a step), step (0-based,
 //            -1 outside steps), steps, occlusion_deg, repetition (1-based), repetitions, run (1-based, 0: not of a
-//            campaign), runs, commanded_rpm, speed_rpm, speed_age_s, thrust_n, thrust_age_s, torque_nm, module_v,
-//            module_a, supply_v, supply_a, coil_degc, derate, fault_bits, vibration [rms of Fx … Tz, N and N m],
-//            blade_pass_hz, blade_pass_n, received, lost_network, lost_host, watched {key: value, …} of every guarded
-//            quantity, silent_s (since the runner's last tick), dropped (frames and messages that this page did not
-//            get)
+//            campaign), runs, samples (of the campaign), commanded_rpm, speed_rpm, speed_age_s, thrust_n, thrust_age_s,
+//            torque_nm, module_v, module_a, supply_v, supply_a, coil_degc, derate, fault_bits, vibration [rms of Fx …
+//            Tz, N and N m], blade_pass_hz, blade_pass_n, received, lost_network, lost_host, watched {key: value, …} of
+//            every guarded quantity, silent_s (since the runner's last tick), dropped (frames and messages that this
+//            page did not get)
 //   step     a step is over: occlusion_deg, repetition, step, speed_rpm, speed2_rad2_s2, thrust_n, k_n_s2, u_k_n_s2, n
 //   line     a line of the log: time_s, text
-//   ask      a person is asked this in the terminal, the motor is locked meanwhile: text; empty: answered
+//   ask      a person is asked this in the terminal, the rotor is at rest and locked meanwhile: text ("": answered),
+//            occlusion_deg of the next run, has_power (the motor, as far as kphi knows), drawing (SVG of what is to be
+//            mounted, or "")
 //   reached  what the campaign knows so far: text
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text
@@ -66,7 +68,6 @@ struct Subject {
 struct Tick {
   double time_s = 0;       ///< bench time
   double timestamp_s = 0;  ///< calendar time, seconds since 1970, UTC
-  double progress = 0;     ///< of the campaign, 0 to 1
   Position position;
   Observation seen;
 
@@ -102,7 +103,7 @@ struct Message {
 [[nodiscard]] std::string tick_message(const Tick& tick, double silent_s, std::uint64_t dropped);
 [[nodiscard]] Message step_message(const Position& at, const StepFigures& seen);
 [[nodiscard]] Message line_message(double time_s, const std::string& text);
-[[nodiscard]] Message ask_message(const std::string& text);
+[[nodiscard]] Message ask_message(const StandQuestion& question);
 [[nodiscard]] Message reached_message(const std::string& text);
 [[nodiscard]] Message stop_message(double time_s);
 [[nodiscard]] Message end_message(double time_s, bool well, const std::string& text);

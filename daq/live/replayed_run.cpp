@@ -123,6 +123,7 @@ void ReplayedRun::show(Instant when, Progress& progress, double speed) {
   observe(when);
   clock_.set(when);
   position_.remaining_s = to_seconds(std::max(Duration(0), end_ - when)) / speed;
+  position_.done = to_seconds(when - begin_) / to_seconds(std::max(Duration(1), end_ - begin_));
   progress.tick(position_, seen_);
 }
 

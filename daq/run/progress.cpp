@@ -21,10 +21,13 @@ std::size_t width_of(const std::string& line) {
       std::ranges::count_if(line, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
 }
 
-/// "44 %": of the runs, those begun counted in part.
-std::string share_done(const Position& position) {
-  const double steps = std::max(position.steps, 1), within = std::max(position.step, 0) / steps;
-  return fmt::format("{:.0f} %", 100 * (position.run - 1 + within) / std::max(position.runs, 1));
+/// "44 %", and 100 % only at the end.
+std::string share_done(const Position& position) { return fmt::format("{:.0f} %", std::floor(100 * position.done)); }
+
+/// '?' if nothing comes any more, '–' if it has no zero yet.
+std::string load_words(const Observation& seen, const char* format, double value) {
+  if (!seen.load_cell_is_fresh()) return "?";
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
 }
 
 std::size_t width_of(std::FILE* stream) {
@@ -57,9 +60,7 @@ std::string describe(const Position& position, const Observation& seen, std::siz
   const auto speed = [&](const char* format) {
     return seen.motor_is_fresh() ? fmt::format(fmt::runtime(format), to_rpm(seen.speed())) : std::string("?");
   };
-  const auto thrust = [&](const char* format) {
-    return seen.load_cell_is_fresh() ? fmt::format(fmt::runtime(format), seen.thrust_n) : std::string("?");
-  };
+  const std::string thrust = load_words(seen, "{:.3f}", seen.thrust_n);
   const std::string left = minutes_and_seconds(position.remaining_s);
   const std::string which = position.repetition < 0
                                 ? fmt::format("ref {}", -position.repetition)
@@ -70,7 +71,7 @@ std::string describe(const Position& position, const Observation& seen, std::siz
                                              : fmt::format("step {:2}/{}", position.step + 1, position.steps);
   const std::string whole = fmt::format("{}{}  φ {:3g}°  {}  {}  speed {:>5} of {:5.0f} RPM  thrust {:>6} N  left {}",
                                         run, position.propeller.data(), position.occlusion_deg, which, what,
-                                        speed("{:.0f}"), to_rpm(position.commanded), thrust("{:.3f}"), left) +
+                                        speed("{:.0f}"), to_rpm(position.commanded), thrust, left) +
                             silence(seen);
   if (width_of(whole) <= columns) return whole;
   const std::string short_run =
@@ -78,14 +79,13 @@ std::string describe(const Position& position, const Observation& seen, std::siz
   const std::string short_what =
       position.step < 0 ? std::string(position.phase) : fmt::format("{}/{}", position.step + 1, position.steps);
   return fmt::format("{}φ {:g}° {} {}/{:.0f} RPM {} N {}", short_run, position.occlusion_deg, short_what,
-                     speed("{:.0f}"), to_rpm(position.commanded), thrust("{:.3f}"), left);
+                     speed("{:.0f}"), to_rpm(position.commanded), thrust, left);
 }
 
 std::string describe_by_hand(const Position& position, const Observation& seen, std::size_t) {
   const auto known = [](bool is_known, const char* format, double value) {
     return is_known ? fmt::format(fmt::runtime(format), value) : std::string("?");
   };
-  const bool loaded = seen.load_cell_is_fresh();
   const double watts = seen.judged[Watched::supply_voltage_low] * seen.judged[Watched::supply_current];
   const Vibration& shakes = seen.vibration;
   const double rms_n = std::hypot(shakes.rms[0], shakes.rms[1], shakes.rms[2]);
@@ -93,7 +93,7 @@ std::string describe_by_hand(const Position& position, const Observation& seen, 
       fmt::format("{:>5}{} RPM  thrust {:>6} N  torque {:>6} mN m  {:>4} W  shakes {} N rms",
                   known(seen.motor_is_fresh(), "{:.0f}", to_rpm(seen.speed())),
                   position.commanded > RadPerSec(0) ? fmt::format(" of {:5.0f}", to_rpm(position.commanded)) : "",
-                  known(loaded, "{:.3f}", seen.thrust_n), known(loaded, "{:.1f}", 1e3 * seen.torque_nm),
+                  load_words(seen, "{:.3f}", seen.thrust_n), load_words(seen, "{:.1f}", 1e3 * seen.torque_nm),
                   known(seen.motor_is_fresh() && std::isfinite(watts), "{:.0f}", watts),
                   known(std::isfinite(rms_n), "{:.2f}", rms_n));
   if (std::isfinite(shakes.blade_pass_n))

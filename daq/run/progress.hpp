@@ -26,13 +26,23 @@ struct Position {
   int repetitions = 0;
   int step = -1;  ///< 0-based; -1 outside steps
   int steps = 0;
-  std::string_view phase;  ///< of kPhaseWords; empty in a step
-  RadPerSec commanded;     ///< unsigned
-  double remaining_s = 0;  ///< of the campaign, wall clock
-  int run = 0;             ///< 1-based; 0: not of a campaign
+  std::string_view phase;            ///< of kPhaseWords; empty in a step
+  RadPerSec commanded;               ///< unsigned
+  double remaining_s = 0;            ///< of the campaign, wall clock
+  double done = 0;                   ///< share of the campaign, 0 to 1: its runs count alike, this one by its time
+  std::uint64_t samples_before = 0;  ///< in the runs of the campaign before this one
+  int run = 0;                       ///< 1-based; 0: not of a campaign
   int runs = 0;
 
   void name(std::string_view id) noexcept { id.copy(propeller.data(), propeller.size() - 1); }
+};
+
+/// The rotor is at rest meanwhile.
+struct StandQuestion {
+  std::string text;          ///< one line; empty: no question
+  double occlusion_deg = 0;  ///< of the run that follows
+  bool has_power = true;     ///< the motor, as far as kphi knows
+  std::string drawing{};     ///< SVG of what is to be mounted; may be empty
 };
 
 /// Called from the runner's thread only. By itself it shows nothing.
@@ -49,15 +59,16 @@ class Progress {
   virtual void say(const std::string&) {}
   /// What the campaign knows so far, one line.
   virtual void reached(const std::string& words) { say(words); }
-  /// A person is asked this at the stand, where they see it; empty: answered.
-  virtual void asks(const std::string&) {}
+  /// A person is asked this at the stand, where they see it; without text: answered.
+  virtual void asks(const StandQuestion&) {}
 };
 
 inline constexpr std::size_t kAnyWidth = 200;  ///< columns of a line that need not fit
 
 /// " 7/15 44 %  5x3  φ  90°  rep 2/3  step 17/40  speed  7894 of  7895 RPM  thrust  1.162 N  left 06:12"; stale
-/// values are shown as '?' with their age: "…  thrust      ? N  left 06:12  no thrust for 0.8 s". Where that is wider
-/// than `columns`: " 7/15 44 % φ  90° 17/40  7894/7895 RPM 1.162 N 06:12", at most 60 of them.
+/// values are shown as '?' with their age, thrust before its zero as '–': "…  thrust      ? N  left 06:12  no thrust
+/// for 0.8 s". Where that is wider than `columns`: " 7/15 44 % φ  90° 17/40  7894/7895 RPM 1.162 N 06:12", at most 60
+/// of them.
 [[nodiscard]] std::string describe(const Position& position, const Observation& seen, std::size_t columns = kAnyWidth);
 /// " 6001 of  6000 RPM  thrust  0.612 N  torque   -8.9 mN m   48 W  shakes 0.05 N  blades 0.021 N at 300 Hz".
 [[nodiscard]] std::string describe_by_hand(const Position& position, const Observation& seen,

@@ -22,13 +22,14 @@ namespace {
 constexpr int kReadings = 2;  // attempts at the end; a page may be lost
 
 results::RunHeader header_of(const RunOrder& order, Bench& bench, const results::LoadCellScale& scale) {
-  const auto& [campaign, config, mounted, planned, remaining, file, steering, run_number, runs] = order;
+  const profiles::Campaign& campaign = order.campaign;
+  const profiles::BenchConfig& config = order.config;
   results::RunHeader header;
   header.origin = name_of(config.origin());
   header.started_utc = utc_text(bench.clock(), bench.clock().now());
   // A name-based UUID: unique by campaign, config in it and time, and reproducible on the deterministic bench.
-  const std::string name = fmt::format("{}\n{}\n{}\n{}", campaign.text, file.filename().string(), header.started_utc,
-                                       bench.clock().now().count());
+  const std::string name = fmt::format("{}\n{}\n{}\n{}", campaign.text, order.file.filename().string(),
+                                       header.started_utc, bench.clock().now().count());
   header.uuid = boost::uuids::to_string(boost::uuids::name_generator_sha1(boost::uuids::ns::oid())(name));
   header.tool_version = kVersion;
   header.campaign_name = campaign.name;
@@ -39,8 +40,8 @@ results::RunHeader header_of(const RunOrder& order, Bench& bench, const results:
   header.propeller_name = campaign.propeller.name;
   header.diameter_in = campaign.propeller.diameter_in;
   header.blades = campaign.propeller.blades;
-  header.occlusion_deg = mounted.occlusion_deg();
-  header.repetition = planned.repetition;
+  header.occlusion_deg = order.mounted.occlusion_deg();
+  header.repetition = order.planned.repetition;
   header.thrust_axis = config.thrust_axis;
   header.thrust_sign = config.thrust_sign;
   header.spin = config.iq.spin;

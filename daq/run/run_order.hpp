@@ -25,13 +25,16 @@ class MountConfirmation {
 struct RunOrder {
   const profiles::Campaign& campaign;
   const profiles::BenchConfig& config;
-  MountConfirmation mounted;     ///< unlocks the motor
-  profiles::PlannedRun planned;  ///< may have fewer steps than in the plan
-  double remaining_bench_s = 0;  ///< of the campaign, this run included
-  std::filesystem::path file;    ///< final path
-  Steering* steering = nullptr;  ///< sets the speeds instead of the planned steps
-  int run = 0;                   ///< 1-based number in the campaign; 0: alone
-  int runs = 0;                  ///< of the campaign
+  MountConfirmation mounted;         ///< unlocks the motor
+  profiles::PlannedRun planned;      ///< may have fewer steps than in the plan
+  double run_bench_s = 0;            ///< this run is expected to take
+  bool all_steps = true;             ///< ... if no step ends before its time and none is left out
+  double later_bench_s = 0;          ///< the runs of the campaign after it
+  std::filesystem::path file;        ///< final path
+  Steering* steering = nullptr;      ///< sets the speeds instead of the planned steps
+  int run = 0;                       ///< 1-based number in the campaign; 0: alone
+  int runs = 0;                      ///< of the campaign
+  std::uint64_t samples_before = 0;  ///< in its runs before this one
 };
 
 }  // namespace kphi::daq

@@ -54,10 +54,12 @@ Sequence::Sequence(Bench& bench, Recorder& recorder, Guard& guard, const RunOrde
   position_.occlusion_deg = order.mounted.occlusion_deg();
   position_.run = order.run;
   position_.runs = order.runs;
+  position_.samples_before = order.samples_before;
   position_.repetition = order.planned.repetition;
   position_.repetitions = std::max(order.campaign.repetitions, order.planned.repetition);
   position_.steps = static_cast<int>(order.planned.steps.size());
-  end_ = bench.clock().now() + from_seconds(order.remaining_bench_s);
+  begin_ = bench.clock().now();
+  end_ = begin_ + from_seconds(order.run_bench_s);
 }
 
 void Sequence::run() {
@@ -98,8 +100,17 @@ void Sequence::watch_the_coast(StopWords& words) {
     }
     stop_ = bench_.motor().stop_report();
     if (!stop_) bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+    show_coast();
   }
   add((stop_ ? *stop_ : iq::StopReport{}).summary());
+}
+
+/// What is left of the speed, for whoever pressed STOP.
+void Sequence::show_coast() {
+  position_.phase = kPhaseWords[static_cast<std::size_t>(Phase::spin_down)];
+  position_.step = -1;
+  position_.commanded = RadPerSec(0);
+  progress_.tick(position_, guard_.observe(bench_.clock().now()));
 }
 
 void Sequence::switch_off(StopWords& words) {
@@ -210,7 +221,11 @@ void Sequence::go_through_the_steps(MotorEnable& spin) {
 
 void Sequence::leave_out(std::ptrdiff_t steps) {
   position_.steps -= static_cast<int>(steps);
-  end_ -= steps * from_seconds(order_.campaign.profile.dwell.value());
+  ends_sooner(static_cast<double>(steps) * order_.campaign.profile.dwell.value());
+}
+
+void Sequence::ends_sooner(double seconds) {
+  if (order_.all_steps) end_ -= from_seconds(seconds);
 }
 
 void Sequence::follow(Steering& steering, MotorEnable& spin) {
@@ -293,7 +308,7 @@ void Sequence::hold_until_certain(const profiles::PlannedStep& step, profiles::R
   }
   const auto [mean_n, u_n] = watch.known();
   certainty.held(step, mean_n - zero_n_, u_n, since());
-  end_ -= from_seconds(std::max(0.0, most_s - since()));
+  ends_sooner(std::max(0.0, most_s - since()));
 }
 
 void Sequence::learn_from(const profiles::PlannedStep& step, std::span<const profiles::PlannedStep> later) {
@@ -372,7 +387,10 @@ void Sequence::tick(MotorEnable* spin) {
   show_events();
   const Instant now = bench_.clock().now();
   seen_ = guard_.observe(now);
-  position_.remaining_s = to_seconds(bench_.clock().shrunk(std::max(Duration(0), end_ - now)));
+  const Duration left = std::max(Duration(0), end_ - now), passed = std::max(Duration(1), now - begin_);
+  const double share = to_seconds(passed) / to_seconds(passed + left);
+  position_.done = std::max(position_.done, (std::max(position_.run, 1) - 1 + share) / std::max(position_.runs, 1));
+  position_.remaining_s = to_seconds(bench_.clock().shrunk(left + from_seconds(order_.later_bench_s)));
   progress_.tick(position_, seen_);
 }
 

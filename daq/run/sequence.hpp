@@ -60,6 +60,7 @@ class Sequence {
   void switch_off(StopWords& words);
   /// Waits for the coast to be confirmed, and for standstill.
   void watch_the_coast(StopWords& words);
+  void show_coast();
   void take_box_bias();
   void set_box_bias();
   void spin();
@@ -67,6 +68,7 @@ class Sequence {
   /// As the steering wants, no faster than the campaign's slew.
   void follow(Steering& steering, MotorEnable& spin);
   void leave_out(std::ptrdiff_t steps);
+  void ends_sooner(double seconds);
   /// With `certainty` until it is certain enough, at most as long as the campaign says; else to its end.
   void hold_step(const profiles::PlannedStep& step, std::optional<profiles::RunCertainty>& certainty,
                  MotorEnable& spin);
@@ -93,8 +95,8 @@ class Sequence {
   const std::function<bool()>& stop_asked_;
   Position position_;
   Observation seen_;
-  double zero_n_ = 0;  ///< of the thrust axis, as the box shows it
-  Instant end_{};
+  double zero_n_ = 0;        ///< of the thrust axis, as the box shows it
+  Instant begin_{}, end_{};  ///< of this run, as planned
   int events_shown_ = 0;
   std::string stalled_;  ///< the event that says that the box's measurement stalled; empty while it measures
   results::BoxBias box_bias_;

@@ -46,8 +46,8 @@ std::shared_ptr<void> kept(std::shared_ptr<void> handle, const std::string& why_
 
 SpinResult spin_by_hand(const Spin& spin) {
   const MountConfirmation clear =
-      ask_at_the_stand(spin.bench, spin.person, spin.stop_asked, [&](const std::string& condition) {
-        return spin.person.confirm_clear(to_rpm(spin.speeds.start), condition + about_keypad(spin.bench));
+      ask_at_the_stand(spin.bench, spin.person, spin.stop_asked, [&](const StandAtRest& stand) {
+        return spin.person.confirm_clear(to_rpm(spin.speeds.start), stand.condition() + about_keypad(spin.bench));
       });
   HandControl steering(spin.speeds, spin.keys);
   const StopAsked stop_asked = [&] { return spin.stop_asked() || steering.is_called_off(); };
@@ -55,7 +55,7 @@ SpinResult spin_by_hand(const Spin& spin) {
   profiles::PlannedRun planned;
   planned.mount = false;
   const double lasts_s = spin.speeds.lasts ? to_seconds(*spin.speeds.lasts) : 0;
-  const RunOrder order{spin.campaign, spin.config, clear, planned, lasts_s, spin.file, &steering};
+  const RunOrder order{spin.campaign, spin.config, clear, planned, lasts_s, false, 0, spin.file, &steering};
   SignWatch watched(spin.progress, spin.config.iq.spin);
   std::string awake_not, prompt_not;
   const auto awake = kept(spin.bench.keep_awake(awake_not), awake_not, watched);

@@ -71,7 +71,6 @@ void ModbusSupply::describe() {
   identity_.model = model_->name;
   identity_.device = fmt::format("supply {} on {}", model_->name, address_.where());
   identity_.off = off_word(address_, map, identity_.device);
-  identity_.locks_keypad = map.locks_keypad;
   if (map.serial != kAbsent) {
     const auto at = static_cast<std::size_t>(map.serial);
     identity_.serial = fmt::format("{:08}", static_cast<std::uint32_t>(registers_[at]) << 16 | registers_[at + 1]);
@@ -80,7 +79,11 @@ void ModbusSupply::describe() {
     const unsigned version = registers_[static_cast<std::size_t>(map.firmware)];
     identity_.firmware = fmt::format("{}.{:02}", version / 100, version % 100);
   }
-  (void)read();
+  (void)read();  // after other requests: it has locked its keypad, if it does
+  if (map.keypad != kAbsent) {
+    const bool locked = registers_[static_cast<std::size_t>(map.keypad)] != 0;
+    identity_.keypad = locked ? SupplyKeypad::locked : SupplyKeypad::said_free;
+  }
   identity_.voltage_max_v = model_->max_v;
   identity_.current_max_a = range().max_a;
 }

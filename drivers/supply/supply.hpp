@@ -33,7 +33,7 @@ struct Identity {
   std::string firmware;                         ///< "1.28"; empty: unknown
   double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
   std::optional<LastWord> off{};                ///< switches its output off; nullopt: only this process can
-  bool locks_keypad = false;                    ///< while it is asked: its output key switches nothing
+  SupplyKeypad keypad = SupplyKeypad::free;     ///< while it is asked
 };
 
 class PoweredOutput;

@@ -94,7 +94,7 @@ constexpr RegisterMap kRiden{
     .thresholds = {82, 2},
     .over_voltage = 82,
     .over_current = 83,
-    .locks_keypad = true,
+    .keypad = 15,
 };
 
 // RuiDeng DPH5005 manual, p. 11.

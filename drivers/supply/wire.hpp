@@ -81,7 +81,7 @@ struct RegisterMap {
   int current_range = kAbsent;
   Block thresholds;
   Writable over_voltage, over_current;
-  bool locks_keypad = false;  ///< while it is asked
+  int keypad = kAbsent;  ///< 1 while it is locked, as its own firmware does while it is asked
 };
 
 /// Counts per ampere, and the largest setting, of one position of the current range.

@@ -1,7 +1,7 @@
 // The other end of both wires of this bench: the physics of kphi's simulator, an HX711 on its board, an ESC on its own.
 // Written from the lines that the boards print, not from the drivers.
 //
-//   second_bench_stand SCALE ESC CONTROL     paths of two serial lines and of the socket that says what is mounted
+//   second_bench_stand SCALE ESC CONTROL [SUPPLY]    paths of serial lines and of the socket that says what is mounted
 #include <fmt/format.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -23,6 +23,7 @@
 #include "base/number.hpp"
 #include "compensation/units.hpp"
 #include "drivers/sim/physics/plant.hpp"
+#include "drivers/sim/supply/port.hpp"
 #include "drivers/sim/transport/conversations.hpp"
 #include "drivers/sim/transport/pty.hpp"
 
@@ -35,6 +36,7 @@ constexpr double kCountsPerNewton = 20'000;
 constexpr double kLinesPerSecond = 100;
 constexpr double kOwnStop_s = 0.25;
 constexpr double kPolePairs = 7;
+constexpr double kBoardNeeds_v = 6;  // the ESC's board lives on what the ESC gets
 std::atomic<bool> quit{false};
 
 std::string with_checksum(const std::string& words) {
@@ -53,7 +55,14 @@ void say(sim::Pty& line, bool heard, const std::string& words) {
 
 class Stand {
  public:
-  Stand(const std::string& scale, const std::string& esc) : scale_(scale), esc_(esc), plant_({}, 1) {}
+  /// `supply`: of a supply that powers the ESC, off at first; nullptr: 12 V from somewhere.
+  Stand(const std::string& scale, const std::string& esc, const char* supply)
+      : scale_(scale), esc_(esc), plant_({}, 1) {
+    if (supply == nullptr) return;
+    supply_.emplace(sim::SupplySettings{.model = "RD6024", .faults = {}});
+    supply_line_.emplace(sim::SupplyAddresses{supply, std::nullopt});
+    plant_.power([this](double amps, double siemens) { return supply_->advance({amps, siemens}, now()); });
+  }
 
   /// mount PROPELLER DEGREES; mute scale|esc (it says nothing any more); freeze scale (it repeats its last value);
   /// status: throttle and RPM.
@@ -75,6 +84,8 @@ class Stand {
 
   void advance(double to_s) {
     hear();
+    if (supply_) supply_line_->receive(*supply_, now());
+    if (supply_) supply_line_->send(*supply_, now());
     for (; time_s_ < to_s; time_s_ += sim::kTick) {
       plant_.step(stage());
       sum_ += plant_.reading()[2];
@@ -85,9 +96,13 @@ class Stand {
   }
 
  private:
+  [[nodiscard]] Instant now() const { return from_seconds(time_s_); }
+  [[nodiscard]] bool board_lives() const { return plant_.motor().supply_volts > kBoardNeeds_v; }
+
   void hear() {
     std::array<std::uint8_t, 256> bytes{};
     const std::size_t n = esc_.read(bytes);
+    if (!board_lives()) return;
     heard_.append(reinterpret_cast<const char*>(bytes.data()), n);
     for (std::size_t end; (end = heard_.find('\n')) != std::string::npos;) {
       std::string line = heard_.substr(0, end);
@@ -124,7 +139,7 @@ class Stand {
   void report() {
     next_line_s_ += 1 / kLinesPerSecond;
     const sim::MotorState& motor = plant_.motor();
-    say(esc_, esc_is_,
+    say(esc_, esc_is_ && board_lives(),
         fmt::format("R,{:.0f},{:.0f},{:.0f},{:.0f},{:.0f}", throttle_, kPolePairs * to_rpm(RadPerSec(motor.speed)),
                     100 * motor.supply_volts, 100 * std::max(0.0, motor.supply_amps), motor.controller_celsius));
   }
@@ -134,6 +149,8 @@ class Stand {
   bool scale_is_frozen_ = false;
   long counts_ = 0;
   sim::Plant plant_;
+  std::optional<sim::SupplySlave> supply_;
+  std::optional<sim::SupplyPort> supply_line_;
   std::string heard_;
   double time_s_ = 0, throttle_ = 0, ordered_s_ = -1, next_conversion_s_ = 0, next_line_s_ = 0, sum_ = 0;
   std::uint64_t ticks_ = 0, conversions_ = 0;
@@ -156,12 +173,12 @@ Descriptor listen_at(const char* path) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    std::fputs("usage: second_bench_stand SCALE ESC CONTROL\n", stderr);
+  if (argc != 4 && argc != 5) {
+    std::fputs("usage: second_bench_stand SCALE ESC CONTROL [SUPPLY]\n", stderr);
     return 2;
   }
   for (const int number : {SIGINT, SIGTERM}) std::signal(number, [](int) { quit = true; });
-  Stand stand(argv[1], argv[2]);
+  Stand stand(argv[1], argv[2], argv[4]);  // argv ends with a nullptr
   sim::Conversations control(listen_at(argv[3]), 4, sim::each_question("\n", [&](std::string_view line) {
                                return sim::StreamReply{stand.answer(std::string(line))};
                              }));

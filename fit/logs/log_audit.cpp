@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <future>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
+#include "base/ordered_work.hpp"
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
 #include "fit/logs/thrust_slope.hpp"
@@ -395,19 +398,25 @@ std::vector<LogFinding> audit(const StandLog& log, const RowSelection& selection
   const SpeedSource source = choose_speed(log, selection);
   const auto before = rest_before(log, source), after = rest_after(log, source);
   const double zero_n = before ? before->mean_n : 0;
+  // Beside each other: none needs what another finds.
+  std::future<Findings> of_series = std::async(launch_for(log.rows.size() * sizeof(StandRow)), [&] {
+    Findings findings;
+    audit_zero(log, before, after, selection.tare_rows > 0 ? zero_n : 0, findings);
+    audit_time(log, findings);
+    audit_frozen(log, findings);
+    audit_frozen_speed(log, source, findings);
+    if (const std::vector<std::size_t> rows = plateau(log, source); !rows.empty()) {
+      audit_drift(log, source, rows, findings);
+      audit_noise(log, source, rows, findings);
+    }
+    return findings;
+  });
   Findings findings;
   audit_two_speeds(log, findings);
   audit_spikes(log, source, findings);
   audit_standstill(log, source, zero_n, findings);
   audit_current_limit(log, source, findings);
-  audit_zero(log, before, after, selection.tare_rows > 0 ? zero_n : 0, findings);
-  audit_time(log, findings);
-  audit_frozen(log, findings);
-  audit_frozen_speed(log, source, findings);
-  if (const std::vector<std::size_t> rows = plateau(log, source); !rows.empty()) {
-    audit_drift(log, source, rows, findings);
-    audit_noise(log, source, rows, findings);
-  }
+  std::ranges::move(of_series.get(), std::back_inserter(findings));
   if (!log.not_numbers.empty()) {
     add(findings, FindingKind::not_a_number, log.not_numbers.size(), log.not_numbers.front().line,
         "values left out; the first: " + log.not_numbers.front().what);

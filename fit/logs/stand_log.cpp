@@ -64,7 +64,7 @@ struct LogBlock {
 };
 
 /// Why a field is not a number.
-std::string not_a_number(const Column& column, const std::string& field, const NumberFormat& format) {
+std::string not_a_number(const Column& column, std::string_view field, const NumberFormat& format) {
   if (field.empty()) return fmt::format("{} is missing", name_of(column.role));
   const bool other = looks_like_number(field);
   return fmt::format("{} {} is not a number{}", name_of(column.role), in_quotes(field),
@@ -77,14 +77,15 @@ class BlockReader {
   BlockReader(const RowFormat& format, const std::string& path, LogBlock& block)
       : format_(format), path_(path), block_(block) {}
 
-  void take(const TableRow& fields) {
+  void take(const RowView& fields) {
     StandRow row{.line = static_cast<std::uint32_t>(fields.line)};
     double squares = 0;
     group_.clear();
     for (const Column& column : format_.columns) {
-      const std::string& field = fields.fields[column.index];
+      const std::string_view field = fields.fields[column.index];
       if (column.channel == nullptr && column.role != Role::thrust) {
-        group_ += (group_.empty() ? "" : ", ") + (field.empty() ? "none" : field);
+        if (!group_.empty()) group_ += ", ";
+        group_ += field.empty() ? "none" : field;
         continue;
       }
       const auto number = column.unit.clock ? clock_seconds(field) : format_.numbers.parse(field);
@@ -111,7 +112,7 @@ class BlockReader {
   void skip(std::size_t line, const std::string& why) { block_.problems.push_back({line, why + "; line skipped"}); }
 
   /// Whether the line goes with the field.
-  bool leave_out(const Column& column, const std::string& field, std::size_t line) {
+  bool leave_out(const Column& column, std::string_view field, std::size_t line) {
     if (format_.numbers.decimal == '\0' && field.find_first_of(".,") != std::string::npos && looks_like_number(field)) {
       throw ConfigurationError(
           fmt::format("{}:{}: {} is the first number with a mark; say with --decimal point or "
@@ -152,7 +153,7 @@ LogBlock read_block(const Table& begin, std::string_view text, std::size_t line,
   block.bytes = text.size();
   BlockReader reader(format, begin.path, block);
   Table table = read_csv_rows(
-      begin, text, line, layout.separator, [&](const Table&, const TableRow& fields) { reader.take(fields); },
+      begin, text, line, layout.separator, [&](const Table&, const RowView& fields) { reader.take(fields); },
       layout.comment);
   block.problems.insert(block.problems.begin(), table.problems.begin(), table.problems.end());
   std::ranges::stable_sort(block.problems, {}, &TableProblem::line);

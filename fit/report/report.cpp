@@ -98,6 +98,16 @@ std::string figure_blocks(const Figures& figures, std::size_t begin, std::size_t
   return html;
 }
 
+/// What φ is, on one look.
+std::string stand_section(const std::string& drawing) {
+  if (drawing.empty()) return {};
+  return html_heading("What was measured") + "<figure class=\"stand\">\n" + inline_svg(drawing, "stand-") +
+         "\n<figcaption>The plates cover a sector of angle φ under the propeller; the arrow is its sense of rotation, "
+         "seen "
+         "from above. The load cell measures the thrust less what the air presses on the "
+         "plate.</figcaption></figure>\n";
+}
+
 std::string skipped_note(const Figures& figures) {
   if (figures.skipped.empty()) return {};
   return fmt::format("<p class=\"warning\">Figures skipped: {}.</p>\n", html_escaped(figures.skipped));
@@ -136,13 +146,14 @@ std::string figure_section(const Figures& figures, std::size_t begin, std::size_
 /// prints on two pages: standard air, the budget and the last figures move into its appendix.
 std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool alone) {
   const auto& [identification, analysis] = fitted;
-  const auto& [provenance, figures] = chapter;
+  const Provenance& provenance = chapter.provenance;
+  const Figures& figures = chapter.figures;
   const std::size_t shown = alone ? figures.drawn.size() : 5;
   std::string html =
       origin_banner(provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
   html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
           coefficient_section(fitted);
-  if (alone) html += standard_section(fitted);
+  if (alone) html += standard_section(fitted) + stand_section(chapter.drawing);
   html += figure_section(figures, 1, shown, "How well the model holds", number);
   const std::string more = analysis_sections(analysis) + campaign_sections(identification, provenance);
   if (alone) html += more;
@@ -186,8 +197,8 @@ std::string format_reports(std::span<const Fitted> family, std::span<const Chapt
   }
   const std::string navigation = "<nav>" + contents + "</nav>\n";
   if (std::ranges::all_of(family, [](const Fitted& one) { return one.identification.alone(); }))
-    return page_head("K_T of " + names, "K_T of several logs, without occlusions", names) + navigation + bodies +
-           kPageEnd;
+    return page_head("K_T of " + names, "K_T of several logs, without occlusions", names) + navigation +
+           logs_section(family) + bodies + kPageEnd;
   if (history != nullptr) {
     const std::string propeller = html_escaped(history->propeller);
     return page_head("k(φ) of " + propeller + " over time", propeller + ": its campaigns over time", names) +

@@ -16,6 +16,7 @@ namespace kphi::fit {
 struct Chapter {
   Provenance provenance;
   Figures figures;
+  std::string drawing{};  ///< SVG of the stand and its plates; empty: nobody described a stand
 };
 
 /// The same arguments (and SVG files) give the same bytes.

@@ -129,7 +129,7 @@ class SaidLines final : public daq::Progress {
     lines.push_back(line);
     if (then) then(line);
   }
-  void asks(const std::string& question) override { questions.push_back(question); }
+  void asks(const daq::StandQuestion& question) override { questions.push_back(question.text); }
   /// Lines with these words.
   [[nodiscard]] std::ptrdiff_t count(const std::string& words) const {
     return std::count_if(lines.begin(), lines.end(),
@@ -198,6 +198,8 @@ inline daq::RunOrder first_run(const profiles::Campaign& campaign, const profile
           person.confirm_mounting(campaign.propeller, 0),
           profiles::make_plan(campaign, config).runs.front(),
           10.0,
+          true,
+          0.0,
           file};
 }
 

@@ -28,7 +28,7 @@ class QueueSupply final : public SupplyLink {
   [[nodiscard]] std::string identity() const override { return "test"; }
   std::size_t take(std::span<SupplyReading> out) override { return move_out(readings, out); }
   [[nodiscard]] std::string failure() const override { return {}; }
-  [[nodiscard]] bool locks_keypad() const override { return locks; }
+  [[nodiscard]] SupplyKeypad keypad() const override { return keys; }
   void cut() noexcept override { ++cuts; }
   [[nodiscard]] std::string switch_off() noexcept override {
     if (unconfirmed.empty()) on = false;
@@ -39,7 +39,7 @@ class QueueSupply final : public SupplyLink {
   bool on = false;
   bool refuses = false, interrupted = false;  ///< halfway through switch_on()
   std::string unconfirmed;
-  bool locks = false;  ///< its keypad
+  SupplyKeypad keys = SupplyKeypad::free;
 
  private:
   void switch_on(const StopAsked&) override {

@@ -11,6 +11,9 @@
 #include <system_error>
 #include <thread>
 
+#undef major  // of sys/sysmacros.h
+#undef minor
+
 #include "test/end_to_end/program.hpp"
 
 namespace kphi::test {
@@ -57,7 +60,7 @@ class MountedImage {
     expect_done({"mount", "-o", kind == "xfs" ? "loop,nouuid" : "loop", image.string(), at.string()});
     struct stat status {};
     if (::stat(at.c_str(), &status) != 0) throw MountError(at.string() + ": " + cause());
-    statistics_ = fmt::format("/sys/dev/block/{}:{}/stat", major(status.st_dev), minor(status.st_dev));
+    statistics_ = fmt::format("/sys/dev/block/{}:{}/stat", gnu_dev_major(status.st_dev), gnu_dev_minor(status.st_dev));
   }
   ~MountedImage() {
     if (::umount2(at_.c_str(), 0) != 0) ::umount2(at_.c_str(), MNT_DETACH);

@@ -148,6 +148,27 @@ TEST(Program, SaysAtTheFirstMountingThatTheKeysOfTheSupplySwitchNothing) {
   EXPECT_EQ(run.wait(), 130) << run.err();
 }
 
+TEST(Program, RunsOnWhereTheKeyOfTheSupplyIsDeadAndStopsWhereItSwitches) {
+  for (const bool dead : {true, false}) {
+    RunningBench bench(Manner{.time_scale = 1, .supply = true});
+    write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
+    if (!dead) (void)bench.fault("kind=supply_keys_free for_s=1000");
+    EXPECT_THAT(ran({kphi(), "devices", "--bench", bench.path("bench.yaml")}).out,
+                HasSubstr(dead ? "its output key is no switch for you" : "this one says that it does not"));
+    Process run(bench.run_command());
+    run.wait_for("step  1/");
+    const double pressed_ms = bench.fault("kind=supply_key");
+    EXPECT_EQ(run.wait(), dead ? 0 : 4) << run.err();
+    if (!dead) {
+      EXPECT_THAT(run.err(), AnyOf(HasSubstr("output is off"), HasSubstr("under-voltage"), HasSubstr("motor reading")))
+          << "whichever is seen first";
+    }
+    const Account account = bench.account();
+    EXPECT_TRUE(account.ends_without_power());
+    EXPECT_EQ(account.last_speed_at() > pressed_ms + 1500, dead) << "ms after the key";
+  }
+}
+
 TEST(Program, ThatIsEndedWhileItAsksTheModuleLeavesNoPowerOn) {
   Manner manner;
   manner.supply = true;

@@ -1,9 +1,12 @@
 // The program on disks that refuse something: found before anything turns, said once, and recorded where it can be.
+// Each refusal by itself through a library that is loaded first, and true file systems of the kernel and of user space.
+// (A kernel without clients of NFS and CIFS mounts none.)
 #include <gmock/gmock.h>
 
 #include <algorithm>
 
 #include "results/campaign_folder.hpp"
+#include "test/end_to_end/mounted_image.hpp"
 #include "test/end_to_end/running_bench.hpp"
 
 namespace kphi::test::refusing_disk_test {
@@ -14,19 +17,35 @@ using testing::Not;
 
 struct Refusing {
   const char* name;
-  const char* refuses;  ///< words of refusing_disk.cpp
+  const char* refuses;  ///< words of refusing_disk.cpp; empty: a true file system
   const char* words;    ///< of the program, before anything turns
   bool keeps = true;    ///< runs can be kept there
+  const char* mount{};  ///< shell commands that mount the true one at the folder out, from where that lies
 };
 
 std::ostream& operator<<(std::ostream& out, const Refusing& disk) { return out << disk.name; }
 
 class RefusingDisk : public testing::TestWithParam<Refusing> {
  protected:
+  void SetUp() override {
+    if (GetParam().mount == nullptr) return;
+    try {
+      have_own_mounts();
+      expect_done({"sh", "-ec", "cd '" + out_ + "/..'; " + GetParam().mount});
+    } catch (const MountError& error) {
+      GTEST_SKIP() << error.what();
+    }
+  }
+  /// What serves a mount in user space ends with it.
+  void TearDown() override {
+    if (GetParam().mount != nullptr) ::umount2(out_.c_str(), MNT_DETACH);
+  }
   [[nodiscard]] Ended ran_there(const std::vector<std::string>& command, int exit_code) const {
-    Process process(command, {},
-                    {{"LD_PRELOAD=" KPHI_REFUSING_DISK, "KPHI_DISK=" + campaign_.path("out"),
-                      std::string("KPHI_REFUSES=") + GetParam().refuses}});
+    std::vector<std::string> refusals;
+    if (GetParam().mount == nullptr)
+      refusals = {"LD_PRELOAD=" KPHI_REFUSING_DISK, "KPHI_DISK=" + campaign_.path("out"),
+                  std::string("KPHI_REFUSES=") + GetParam().refuses};
+    Process process(command, {}, {refusals});
     EXPECT_EQ(process.wait(), exit_code) << process.out() << process.err();
     return {process.out(), process.err()};
   }
@@ -76,6 +95,18 @@ INSTANTIATE_TEST_SUITE_P(
         Refusing{"ReadOnly", "create", "no run can be kept here: Read-only file system", false},
         Refusing{"ThatFailsToRename", "rename", "no run can be kept here: rename: Input/output error", false},
         Refusing{"ThatFailsToSync", "sync", "no run can be kept here: fdatasync: Input/output error", false}),
+    [](const testing::TestParamInfo<Refusing>& tested) { return std::string(tested.param.name); });
+
+INSTANTIATE_TEST_SUITE_P(
+    True, RefusingDisk,
+    testing::Values(Refusing{"ExFat", "", "cannot make a file read-only", true,
+                             "truncate -s 300M image; mkfs.exfat image; L=$(losetup -f --show image); "
+                             "mount.exfat-fuse $L out; losetup -d $L"},
+                    Refusing{"Fuse", "", "cannot make a file read-only", true,
+                             "mkdir below; bindfs --chmod-deny below out"},
+                    Refusing{"ReadOnly", "", "no run can be kept here: Read-only file system", false,
+                             "mount -t tmpfs -o ro none out"},
+                    Refusing{"Full", "", "No space left on device", false, "mount -t tmpfs -o size=4k none out"}),
     [](const testing::TestParamInfo<Refusing>& tested) { return std::string(tested.param.name); });
 
 /// A live bench, whose motor could turn.

@@ -12,6 +12,7 @@
 #include "profiles/strict_yaml.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/program.hpp"
+#include "test/end_to_end/terminal.hpp"
 #include "test/soon.hpp"
 #include "test/source_dir.hpp"
 
@@ -53,11 +54,17 @@ TEST(SpeedLoop, GivesWhatTheSpeedNeedsThenCorrectsAndNeverWindsUp) {
 /// The simulated stand, and the bench file with its paths.
 class Stand : public testing::Test {
  protected:
-  Stand() : process_({KPHI_STAND, path("scale"), path("esc"), path("control")}) {
+  explicit Stand(bool supply = false)
+      : process_(supply
+                     ? std::vector<std::string>{KPHI_STAND, path("scale"), path("esc"), path("control"), path("supply")}
+                     : std::vector<std::string>{KPHI_STAND, path("scale"), path("esc"), path("control")}) {
     process_.wait_for("ready");
     std::string text = profiles::read_text(test::source_dir() + "/examples/second_bench/bench.yaml");
     for (std::size_t at; (at = text.find("/tmp/second/")) != std::string::npos;)
       text.replace(at, 11, folder_.path().string());
+    if (supply)
+      text += "supply: {uri: \"modbus-rtu:" + path("supply") +
+              "?model=RD6024\", voltage_v: 12, current_limit_a: 24, over_voltage_v: 14, over_current_a: 24}\n";
     test::write(path("bench.yaml"), text);
     bench_ = profiles::load_bench(path("bench.yaml"));
     (void)tell("mount 5x3 0");
@@ -202,6 +209,7 @@ TEST_F(Esc, SaysThatItsBoardIsSilent) {
 
 class SecondBench : public Stand {
  protected:
+  using Stand::Stand;
   [[nodiscard]] std::vector<std::string> command(const std::string& campaign) {
     test::write(path("campaign.yaml"), campaign);
     return {kphi(), "run", path("campaign.yaml"), "--bench", path("bench.yaml"), "--yes", "--out", path("out")};
@@ -275,6 +283,42 @@ TEST_F(SecondBench, NeverTurnsAgainAMotorThatItsBoardLetGoWhileKphiStoodStill) {
   run.signal(SIGCONT);  // at once: before the lease is over, and the guard's patience
   while (run.hear(milliseconds(5))) ASSERT_EQ(throttle(), 0) << run.err();
   EXPECT_EQ(run.wait(), 4) << run.err();
+}
+
+/// Its ESC's board lives on what the supply gives.
+class SuppliedBench : public SecondBench {
+ protected:
+  SuppliedBench() : SecondBench(true) {}
+  [[nodiscard]] std::vector<std::string> devices(const std::vector<std::string>& more = {}) const {
+    return test::joined({kphi(), "devices", "--bench", path("bench.yaml")}, more);
+  }
+  [[nodiscard]] double rpm_after(const std::string& campaign) {
+    EXPECT_EQ(test::Process(command(campaign)).wait(), 0);
+    return rpm();
+  }
+};
+
+TEST_F(SuppliedBench, IsAskedWithItsSupplySwitchedOnWhereAPersonWantsThat) {
+  const auto unasked = ran(devices());
+  EXPECT_THAT(unasked.out, HasSubstr("without power"));
+  EXPECT_THAT(unasked.out, HasSubstr("give --switch-on to ask it"));
+  for (const char* answer : {"no", "on"}) {
+    test::Terminal terminal;
+    test::Process asked(devices(), {}, {{}, terminal.descriptor(), 0});
+    asked.wait_for_prompt({"or only Enter: "});
+    terminal.type(answer);
+    EXPECT_EQ(asked.wait(), 0) << asked.err();
+    EXPECT_EQ(asked.out().find("ESC on ") != std::string::npos, answer == std::string("on")) << asked.out();
+  }
+  const auto switched = ran(devices({"--switch-on"}));
+  EXPECT_THAT(switched.out, HasSubstr("the supply's output was on to ask it, and is off again"));
+  EXPECT_THAT(ran(devices({"--json"})).out, HasSubstr("\"output\": false"));
+  EXPECT_LT(rpm(), 1);
+}
+
+TEST_F(SuppliedBench, RunsWithTheSupplyOnAndEndsWithItOff) {
+  EXPECT_LT(rpm_after(test::short_campaign_text("0", 1, 3)), 1000);
+  EXPECT_THAT(ran(devices({"--json"})).out, HasSubstr("\"output\": false"));
 }
 
 TEST_F(SecondBench, NamesTheDriversThatThereAreWhereOneIsUnknown) {

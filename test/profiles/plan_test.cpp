@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -21,8 +22,19 @@ TEST(Plan, OfThePapersCampaignHasFifteenRunsAndTwentyMinutesOfSpinning) {
   EXPECT_EQ(plan.mountings, 15);
   EXPECT_EQ(plan.steps, 600);
   EXPECT_EQ(plan.spinning, Seconds(1200));
-  EXPECT_EQ(plan.bench, Seconds(1260));
-  EXPECT_EQ(plan.samples, 8'820'000u);
+  EXPECT_EQ(plan.bench, Seconds(1260 + 15 * 3.5)) << "zeros, and from the last step to rest";
+  EXPECT_EQ(plan.samples, 9'187'500u);
+}
+
+TEST(Plan, OfTheDemoIsWhatTheReadmeSays) {
+  const Plan plan =
+      make_plan(load_campaign(shipped("icra2021_5in_3blade.yaml")), load_bench(shipped("bench_simulated.yaml")));
+  std::ifstream file(kphi::test::source_dir() + std::string("/README.md"));
+  const std::string readme((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_THAT(readme,
+              testing::HasSubstr(fmt::format("{} runs of {} steps", plan.runs.size(), plan.runs.front().steps.size())));
+  EXPECT_THAT(readme, testing::ContainsRegex(
+                          fmt::format("planned: {:.1f}[[:space:]]million", static_cast<double>(plan.samples) / 1e6)));
 }
 
 TEST(Plan, CountsTheTimeThatTheBoxesBiasTakes) {
@@ -138,7 +150,7 @@ TEST(Plan, CountsTheStepsOfTheWayBackAndTheTimeOfRamps) {
 TEST(Plan, CountsSamplesAtTheBenchsRate) {
   const Campaign campaign = parse_campaign(kCampaignText, "c.yaml");         // 6 runs of 4 steps of 2 s, zeros of 3 s
   const Plan plan = make_plan(campaign, parse_bench(kBenchText, "b.yaml"));  // 3500 Hz
-  EXPECT_EQ(plan.samples, 6u * (8 + 6) * 3500);
+  EXPECT_EQ(plan.samples, 6u * (2 * (8 + 6) + 7) * 3500 / 2) << "3.5 s to rest after each";
 }
 
 TEST(Plan, IsRefusedOnABenchWhoseMotorOrStandMayNotTurnSoFast) {

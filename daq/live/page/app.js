@@ -11,7 +11,7 @@ const kMostGhost = 20000;  // points of one run
 const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
 
 const state = { hello: null, limits: [], tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
-                numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: '', held: {},
+                numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: null, well: true, held: {},
                 run: null, before: new Map() };
 
 /// What the lower chart can show: unit, and the value of a tick.
@@ -58,6 +58,8 @@ const readOut = (name, words) => ({
   highlightCallback: (event, x, points) => text(name + '_read', words(x, points.filter(point => point.yval !== null))),
   unhighlightCallback: () => text(name + '_read', ''),
   zoomCallback: () => { state.held[name] = true; } });
+/// Numbers of an axis that spans this: two digits of it.
+const axisOf = span => value => fixed(value, Math.min(4, Math.max(0, Math.ceil(1 - Math.log10(span)))));
 const common = name => ({ legend: 'never', interactionModel: hands(name), showLabelsOnHighlight: false, highlightCircleSize: 0,
   gridLineColor: colour('line'), axisLineColor: colour('line'), rightGap: 12, strokeWidth: 2, animatedZooms: false,
   axisLabelFontSize: 14, xAxisHeight: 24 });
@@ -77,9 +79,9 @@ function makeCharts() {
     labels: ['t', 'before', 'now'], series: { before: { strokePattern: [6, 4], strokeWidth: 1.5 } },
     colors: [colour('soft'), colour('thrust')], axes: { y: { axisLabelWidth: 62 } } });
   charts.k = new Dygraph(at('k_chart'), empty(1), { ...common('k'),
-    ...readOut('k', (x, points) => points.map(p => `φ ${p.name}: ${fixed(p.yval, 4)} at ${thousands(Math.sqrt(x * 1e6) * 30 / Math.PI)} RPM`).join(', ')),
+    ...readOut('k', (x, points) => points.map(p => `φ ${p.name}: ${fixed(p.yval, 4)} at ${thousands(x)} RPM`).join(', ')),
     labels: ['x', 'k'], strokeWidth: 0, drawPoints: true,
-    pointSize: 5, drawPointCallback: drawStep, axes: { y: { axisLabelWidth: 62 } } });
+    pointSize: 5, drawPointCallback: drawStep, axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62 } } });
   state.chartsDue = state.stepsDue = true;
 }
 
@@ -126,27 +128,27 @@ function drawTraces() {
   const room = Math.max(0.08 * (top - bottom), 1e-3 * Math.abs(top), 1e-3);
   const speedTop = 1.06 * Math.max(state.hello.speed_max_rpm, 100);
   charts.speed.updateOptions({ file: rows.map(row => [row.t, row.commanded, row.measured]), ...view('speed', window_, [0, speedTop]) });
-  charts.thrust.updateOptions({ file: shown, ...view('thrust', window_, [bottom - room, top + room]) });
+  charts.thrust.updateOptions({ file: shown, ...view('thrust', window_, [bottom - room, top + room]),
+    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: axisOf(top - bottom + 2 * room) } } });
   at('ghost_key').hidden = !shown.some(([, before]) => before !== null);
 }
 
 function drawSteps() {
-  const steps = state.steps.sort((a, b) => a.speed2_rad2_s2 - b.speed2_rad2_s2);
+  const steps = state.steps.sort((a, b) => a.speed_rpm - b.speed_rpm);
   if (steps.length === 0) return;
   const angles = [...new Set(steps.map(step => step.occlusion_deg))].sort((a, b) => a - b);
   const paints = angles.map((_, i) => occlusionColours()[i % 8]);
-  const rows = steps.map(step => [step.speed2_rad2_s2 / 1e6,
+  const rows = steps.map(step => [step.speed_rpm,
     ...angles.map(angle => angle === step.occlusion_deg ? 1e6 * step.k_n_s2 : null)]);
   // Below a third of the highest speed noise hides the thrust: such points do not set the scale.
-  const fastest = steps[steps.length - 1].speed2_rad2_s2, u = step => step.u_k_n_s2 || 0;
-  const shown = steps.filter(step => step.speed2_rad2_s2 >= fastest / 9);
+  const fastest = steps[steps.length - 1].speed_rpm, u = step => step.u_k_n_s2 || 0;
+  const shown = steps.filter(step => step.speed_rpm >= fastest / 3);
   const low = 1e6 * Math.min(...shown.map(step => step.k_n_s2 - u(step)));
   const high = 1e6 * Math.max(...shown.map(step => step.k_n_s2 + u(step)));
   const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
-  const digits = Math.max(0, Math.ceil(1 - Math.log10(high - low + 2 * room)));
   charts.k.updateOptions({ file: rows.length > 1 ? rows : [rows[0], rows[0]], labels: ['x', ...angles.map(a => a + '°')],
     colors: paints, ...view('k', [0, 1.05 * rows[rows.length - 1][0]], [low - room, high + room]),
-    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: value => fixed(value, digits) } } });
+    axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62, pixelsPerLabel: 24, axisLabelFormatter: axisOf(high - low + 2 * room) } } });
   at('k_keys').replaceChildren(...angles.map((angle, i) => {
     const key = document.createElement('span');
     key.className = 'key';
@@ -159,9 +161,10 @@ function drawSteps() {
 // ---- numbers
 function showNumbers() {
   const tick = state.tick;
-  if (!tick) return;
+  if (!tick) return state.question && showFirstQuestion(state.question);
+  const untared = tick.thrust_n === null && tick.thrust_age_s < kSilent_s;
   showFigure('thrust', tick.thrust_n, value => fixed(value, 3), tick.thrust_age_s,
-    tick.torque_nm === null ? '\u00a0' : `torque ${fixed(1e3 * tick.torque_nm, 1)} mN m`);
+    tick.torque_nm === null ? '\u00a0' : `torque ${fixed(1e3 * tick.torque_nm, 1)} mN m`, untared ? 'no zero yet' : '');
   const turns = tick.step >= 0;
   showFigure('speed', tick.speed_rpm, thousands, tick.speed_age_s,
     turns ? `commanded ${thousands(tick.commanded_rpm)}` : 'not commanded');
@@ -169,11 +172,11 @@ function showNumbers() {
     Math.abs(tick.speed_rpm - tick.commanded_rpm) > 0.05 * tick.commanded_rpm + 100);
   at('run_place').hidden = !tick.runs;
   text('run', `${tick.run}/${tick.runs}`);
-  text('occlusion', fixed(tick.occlusion_deg, 0) + '°');
+  text('occlusion', fixed((state.question || tick).occlusion_deg, 0) + '°');
   text('repetition', `${tick.repetition}/${tick.repetitions}`);
-  const waits = tick.silent_s > kSilent_s && !state.ended;
+  const waits = state.question !== null || (tick.silent_s > kSilent_s && !state.ended);
   text('step', waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
-  text('step_word', waits ? 'see the terminal' : turns ? 'step' : '');
+  text('step_word', waits ? 'terminal' : turns ? 'step' : '');
   text('left', clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
@@ -182,11 +185,22 @@ function showNumbers() {
   showLimits(tick);
 }
 
-/// Stale values are shown as '?' with their age.
-function showFigure(id, value, words, age_s, beside) {
-  const silent_s = Math.max(age_s, state.tick.silent_s), stale = value === null || state.tick.silent_s > kSilent_s;
-  text(id, state.ended ? '–' : stale ? '?' : words(value));
-  text(id + '_beside', state.ended ? `run over, last value ${words(value)}` : stale ? `no reading for ${fixed(silent_s, 1)} s` : beside);
+/// Asked before the first run: no reading yet but that of the rest.
+function showFirstQuestion(question) {
+  text('occlusion', fixed(question.occlusion_deg, 0) + '°');
+  text('speed', '0');
+  text('speed_beside', 'at rest');
+  if (!question.has_power) text('supply', 'off');
+}
+
+/// Stale values are shown as '?' with their age; `none` says why there is no value yet. While a person is asked, the
+/// rotor is at rest, as kphi watches.
+function showFigure(id, value, words, age_s, beside, none = '') {
+  const silent_s = Math.max(age_s, state.tick.silent_s), asked = state.question !== null && !state.ended;
+  const stale = !asked && !none && (value === null || state.tick.silent_s > kSilent_s);
+  text(id, state.ended || none ? '–' : asked ? (id === 'speed' ? '0' : '–') : stale ? '?' : words(value));
+  text(id + '_beside', state.ended ? `run over, last value ${words(value)}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
+    : none || (stale ? `no reading for ${fixed(silent_s, 1)} s` : beside));
   at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
   at(id).closest('.figure').classList.toggle('over', state.ended);
 }
@@ -194,8 +208,9 @@ function showFigure(id, value, words, age_s, beside) {
 function showReadings(tick) {
   const electric = (volts, amps) => volts === null || amps === null ? 'none'
     : `${fixed(volts, 2)} V · ${fixed(amps, 2)} A · ${fixed(volts * amps, 0)} W`;
-  text('supply', electric(tick.supply_v, tick.supply_a));
-  text('module', electric(tick.module_v, tick.module_a).replace('none', '?'));
+  const off = state.question !== null && !state.question.has_power;
+  text('supply', off ? 'off' : electric(tick.supply_v, tick.supply_a));
+  text('module', off ? 'no power' : electric(tick.module_v, tick.module_a).replace('none', '?'));
   text('coil', fixed(tick.coil_degc, 0) + ' °C');
   const faulty = tick.fault_bits !== 0 || (tick.derate !== null && tick.derate < 0.9999);
   text('drive', tick.fault_bits !== 0 ? `fault 0x${tick.fault_bits.toString(16)}`
@@ -204,7 +219,8 @@ function showReadings(tick) {
   const rms = Math.hypot(...(tick.vibration || [null]).slice(0, 3).map(each => each ?? NaN));
   text('vibration', Number.isNaN(rms) ? '–' : `${fixed(rms, 2)} N` + (tick.blade_pass_n === null ? ''
     : ` · ${fixed(tick.blade_pass_n, 2)} N at ${fixed(tick.blade_pass_hz, 0)} Hz`));
-  text('received', thousands(tick.received));
+  text('received', thousands(tick.samples));
+  text('samples_word', tick.runs ? 'Samples of the campaign' : 'Samples');
   text('lost', `${thousands(tick.lost_network)}, ${thousands(tick.lost_host)}`);
   at('lost').classList.toggle('bad', tick.lost_network + tick.lost_host > 0);
 }
@@ -271,7 +287,14 @@ function tone(after_s, hertz, seconds) {
 }
 function alarm() { if (tones) for (let i = 0; i < 6; ++i) tone(0.4 * i, i % 2 ? 880 : 660, 0.3); }
 
-const title = words => { document.title = `${words}${state.hello ? state.hello.name : 'kphi'} – kphi`; };
+/// As the state is.
+function showTitle() {
+  const { tick, hello } = state, turning = tick && (tick.step >= 0 || tick.speed_rpm > 50) && !state.question;
+  const words = !hello ? '' : state.ended ? (state.well ? 'finished – ' : 'STOPPED – ') : state.asked ? 'stopping – '
+    : state.question ? 'waiting – ' : hello.replay ? 'replay – ' : turning ? 'turning – ' : '';
+  const all = `${words}${hello ? hello.name : 'kphi'} – kphi`;
+  if (document.title !== all) document.title = all;
+}
 
 // ---- stop
 function banner(kind, title, words) {
@@ -321,8 +344,10 @@ at('stop').addEventListener('click', event => { if (event.detail === 0) stop(); 
 const take = {
   hello(message) {
     Object.assign(state, { hello: message, tick: null, trace: [], steps: [], ended: false, asked: false });
-    Object.assign(state, { question: '', held: {}, run: null, before: new Map() });
-    title('');
+    Object.assign(state, { question: null, held: {}, run: null, before: new Map() });
+    showPlate();
+    showTitle();
+    at('link').className === 'good' && text('link', message.replay ? 'replay' : 'live');
     text('name', message.name);
     text('what', message.propeller + (message.simulated ? ' · SIMULATED' : '') +
       (message.replay ? ' · replay of a recorded run' : ''));
@@ -356,16 +381,19 @@ const take = {
     if (state.hello.weighs) banner('', message.text, '');
   },
   ask(message) {
-    state.question = message.text;
-    if (state.ended || state.asked || (!message.text && !state.tick)) return;
+    state.question = message.text ? message : null;
+    state.numbersDue = true;
+    showPlate();
+    showTitle();
+    if (state.ended || state.asked) return;
     banner('', message.text ? 'Asked in the terminal:' : '', message.text ? `${message.text} The motor is locked.` : '');
-    title(message.text ? 'waiting – ' : '');
   },
   reached(message) { text('reached', message.text); },
   stop(message) {
     state.asked = true;
     addLine(message.time_s, 'STOP pressed on this page');
     banner('', 'STOP received.', 'Coasting the motor.');
+    showTitle();
     showStop();
   },
   end(message) {
@@ -373,13 +401,26 @@ const take = {
     state.numbersDue = true;
     addLine(message.time_s, message.text);
     const { replay, by_hand, weighs } = state.hello;
-    title(message.well ? 'finished – ' : 'STOPPED – ');
+    state.well = message.well;
+    state.question = null;
+    showPlate();
+    showTitle();
     if (!message.well) alarm();
     const well = replay ? 'The replay is over.' : weighs ? 'Weighed.' : by_hand ? 'The motor is at rest.' : 'Campaign finished.';
     banner(message.well || state.asked ? 'good' : 'bad', message.well ? well : state.asked ? 'Stopped as asked.' : 'The run is over.', message.well ? (weighs ? message.text : '') : message.text);
     showStop();
   },
 };
+
+/// What is to be mounted, as kphi draws it.
+function showPlate() {
+  const drawing = state.question && !state.ended ? state.question.drawing : '';
+  document.body.classList.toggle('asked', drawing !== '');
+  at('plate_card').hidden = drawing === '';
+  text('plate_word', !drawing ? '' : state.question.occlusion_deg === 0 ? 'Nothing under the propeller' : 'Mount this under the propeller');
+  const svg = drawing ? new DOMParser().parseFromString(drawing, 'image/svg+xml').documentElement : null;
+  at('plate').replaceChildren(...(svg ? [svg] : []));
+}
 
 /// A run that begins ends the one before: from then on that is the ghost of the next at its φ.
 function followRun(tick) {
@@ -412,7 +453,7 @@ at('curve').addEventListener('change', () => { state.curve = at('curve').value; 
 function frame(now) {
   requestAnimationFrame(frame);
   if (!state.hello) return;
-  if (state.numbersDue) { state.numbersDue = false; showNumbers(); }
+  if (state.numbersDue) { state.numbersDue = false; showNumbers(); showTitle(); }
   const due = now - state.drawn >= Math.max(50, 4 * state.cost);
   if (!due || !(state.chartsDue || state.stepsDue)) return;
   const began = performance.now();
@@ -427,7 +468,7 @@ function frame(now) {
 let link = null;
 function connect() {
   link = new WebSocket(`ws://${location.host}/live${location.search}`);
-  link.onopen = () => { at('link').className = 'good'; text('link', 'live'); showStop(); };
+  link.onopen = () => { at('link').className = 'good'; text('link', state.hello && state.hello.replay ? 'replay' : 'live'); showStop(); };
   link.onmessage = event => { const message = JSON.parse(event.data); if (take[message.type]) take[message.type](message); };
   link.onclose = () => {
     at('link').className = state.ended ? 'over' : 'bad';

@@ -226,6 +226,8 @@ const std::vector<FaultRow>& fault_rows() {
       {K::supply_closed, "supply_closed", kWindow, {}},
       {K::supply_trip, "supply_trip", kOnce, {required<&F::code>("code", 1, 5)}},
       {K::supply_panel, "supply_panel", kOnce, {word_at, word}},
+      {K::supply_key, "supply_key", kOnce, {}},
+      {K::supply_keys_free, "supply_keys_free", kWindow, {}},
       {K::supply_sag, "supply_sag", kWindow, {volts}},
       {K::ambient_unplug, "ambient_unplug", kWindow, {}},
       {K::ambient_no_reply, "ambient_no_reply", kSome, {}},

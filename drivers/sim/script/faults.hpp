@@ -109,7 +109,9 @@ enum class FaultKind : std::uint8_t {
   supply_reads_as,        ///< `register` reads `value`
   supply_closed,          ///< port and connection are gone
   supply_trip,            ///< switches itself off: `code` 1 OVP, 2 OCP, 3 OPP, 4 over-heated, 5 short circuit
-  supply_panel,           ///< `register` is set to `value` on the front panel
+  supply_panel,           ///< `register` is set to `value` on the front panel, also where its keys are locked
+  supply_key,             ///< its output key is pressed: switches, unless the keypad is locked
+  supply_keys_free,       ///< its firmware does not lock the keypad
   supply_sag,             ///< its output falls by `volts`
   // the air sensor on USB, and an instrument there
   ambient_unplug,      ///< pulled out during for_s, then plugged in again

@@ -15,8 +15,10 @@ enum Function : std::uint8_t { kRead = 0x03, kWriteOne = 0x06, kWriteMany = 0x10
 enum Exception : int { kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3 };
 constexpr std::size_t kFramesKept = 1000;
 constexpr std::uint8_t kGarbage = 0x55;
-constexpr int kLookBytes = 45;        // of an answer with twenty registers
-constexpr double kLongestStep = 1.0;  // s
+constexpr int kLookBytes = 45;                             // of an answer with twenty registers
+constexpr double kLongestStep = 1.0;                       // s
+constexpr std::uint16_t kKeypadLock = 15;                  // a Riden's
+constexpr Duration kKeysLocked = std::chrono::seconds(2);  // after a request; no source says how long
 
 unsigned word(const std::vector<std::uint8_t>& bytes, std::size_t at) { return bytes[at] * 256u + bytes[at + 1]; }
 
@@ -110,11 +112,13 @@ double SupplySlave::advance(const SupplyLoad& load, Instant now) {
   for (std::size_t i = 0; i < script_.size(); ++i) {
     const Fault& fault = script_[i];
     if (fault.kind == FaultKind::supply_sag && fault.active(now)) sag += fault.volts;
-    const bool momentary = fault.kind == FaultKind::supply_trip || fault.kind == FaultKind::supply_panel;
+    const bool momentary = fault.kind == FaultKind::supply_trip || fault.kind == FaultKind::supply_panel ||
+                           fault.kind == FaultKind::supply_key;
     if (!momentary || now < fault.at || !script_.unused(i)) continue;
     script_.use(i);
     if (fault.kind == FaultKind::supply_trip) circuit_.trip(static_cast<SupplyProtection>(fault.code));
     if (fault.kind == FaultKind::supply_panel) registers_.write(fault.address, fault.value);
+    if (fault.kind == FaultKind::supply_key) press_output_key(now);
   }
   circuit_.sag(sag);
   if (now > reached_) circuit_.step(load, std::min(kLongestStep, to_seconds(now - reached_)));
@@ -148,7 +152,25 @@ const Fault* SupplySlave::meet(FaultKind kind, Instant now) {
   return met;
 }
 
-bool SupplySlave::hears(Instant now) { return !closed(now) && meet(FaultKind::supply_deaf, now) == nullptr; }
+bool SupplySlave::keypad_locked(Instant now) const {
+  const auto frees = [](const Fault& fault) { return fault.kind == FaultKind::supply_keys_free; };
+  return registers_.model().family == SupplyModel::Family::riden && last_asked_ && now - *last_asked_ < kKeysLocked &&
+         !script_.any_active(now, frees);
+}
+
+void SupplySlave::press_output_key(Instant now) {
+  if (keypad_locked(now)) {
+    ++truth_.dead_keys;
+  } else {
+    circuit_.switch_output(!circuit_.output());
+  }
+}
+
+bool SupplySlave::hears(Instant now) {
+  if (closed(now) || meet(FaultKind::supply_deaf, now) != nullptr) return false;
+  last_asked_ = now;
+  return true;
+}
 
 std::optional<Duration> SupplySlave::answers(Instant now) {
   using K = FaultKind;
@@ -170,6 +192,7 @@ void SupplySlave::answer(int client, ModbusFraming framing, const ModbusRequest&
   ++truth_.requests;
   if (truth_.frames.size() < kFramesKept) truth_.frames.push_back(request.adu);
   if (meet(K::supply_deaf, now) != nullptr) return;
+  last_asked_ = now;
   const Fault* exception = meet(K::supply_exception, now);
   const Pdu pdu = exception != nullptr ? refuse(request.pdu[0], exception->code) : apply(request.pdu, now);
   if (everybody || meet(K::supply_no_reply, now) != nullptr) return;
@@ -221,6 +244,7 @@ std::uint16_t SupplySlave::value_at(std::uint16_t at, std::uint16_t value, Insta
   for (const Fault& fault : script_.faults()) {
     if (fault.kind == FaultKind::supply_reads_as && fault.active(now) && fault.address == at) return fault.value;
   }
+  if (registers_.model().family == SupplyModel::Family::riden && at == kKeypadLock) return keypad_locked(now) ? 1 : 0;
   return value;
 }
 

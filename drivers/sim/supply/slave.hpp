@@ -79,6 +79,7 @@ struct SupplyTruth {
   std::uint64_t faults = 0;                                     ///< times that a fault met a reply
   std::vector<std::pair<std::uint16_t, std::uint16_t>> writes;  ///< register and value, in order
   std::vector<std::vector<std::uint8_t>> frames;                ///< requests as they came; the first 1000
+  std::uint64_t dead_keys = 0;                                  ///< times that a locked key was pressed
 };
 
 class SupplySlave {
@@ -126,6 +127,9 @@ class SupplySlave {
   [[nodiscard]] Pdu read(const Pdu& pdu, Instant now);
   [[nodiscard]] Pdu write(const Pdu& pdu, Instant now);
   [[nodiscard]] std::uint16_t value_at(std::uint16_t at, std::uint16_t value, Instant now) const;
+  /// A Riden's own firmware locks it while it is asked.
+  [[nodiscard]] bool keypad_locked(Instant now) const;
+  void press_output_key(Instant now);
   void send(int client, std::vector<std::uint8_t> bytes, Instant due, Duration gap);
   /// The first active fault of this kind that meets this reply; nullptr.
   [[nodiscard]] const Fault* meet(FaultKind kind, Instant now);
@@ -137,6 +141,7 @@ class SupplySlave {
   std::map<int, ModbusScanner> scanners_;
   std::deque<PendingReply> under_way_;
   Instant reached_{0}, last_due_{0}, next_turn_{0};
+  std::optional<Instant> last_asked_;
   SupplyTruth truth_;
 };
 

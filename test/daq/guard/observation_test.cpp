@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <set>
 #include <string>
 
@@ -41,7 +42,16 @@ class Observed : public testing::Test {
                      }};
 };
 
+TEST_F(Observed, KnowsNoThrustBeforeItsZero) {
+  samples(-2.5, 100, -0.1);
+  EXPECT_TRUE(std::isnan(seen(now_).thrust_n));
+  EXPECT_TRUE(std::isnan(seen(now_).torque_nm));
+  EXPECT_TRUE(std::isnan(seen(now_).judged[Watched::thrust]));
+  EXPECT_DOUBLE_EQ(seen(now_).judged[Watched::force_z], 2.5) << "the load on the cell counts from the start";
+}
+
 TEST_F(Observed, ShowsTheNewestOfEverythingWithItsAge) {
+  observer_.take_zero({});
   samples(-2.5, 100, -0.1);
   reading(MotorChannel::speed, -1234.5);
   reading(MotorChannel::supply_voltage, 11.9);
@@ -62,7 +72,6 @@ TEST_F(Observed, ShowsTheNewestOfEverythingWithItsAge) {
   EXPECT_DOUBLE_EQ(shown.judged[Watched::coil_temperature], 61.0);
   EXPECT_DOUBLE_EQ(shown.judged[Watched::load_cell_age], 0.006);
   EXPECT_EQ(shown.motor_age, milliseconds(6));
-  EXPECT_TRUE(std::isnan(shown.judged[Watched::thrust])) << "no zero yet";
   EXPECT_TRUE(std::isnan(shown.judged[Watched::supply_age])) << "no supply";
 }
 

@@ -22,7 +22,7 @@ class Told final : public Progress {
   void tick(const Position&, const Observation&) override { ++ticks; }
   void step_done(const Position&, const Observation&) override { ++steps; }
   void say(const std::string& line) override { lines.push_back(line); }
-  void asks(const std::string& question) override { questions.push_back(question); }
+  void asks(const StandQuestion& question) override { questions.push_back(question.text); }
   int ticks = 0, steps = 0;
   std::size_t limits = 0;
   std::vector<std::string> lines, questions;
@@ -71,12 +71,17 @@ TEST_F(LiveProgressOf, TellsTheTerminalAllTheSameAndPassesOnWhatIsSaid) {
 }
 
 TEST_F(LiveProgressOf, PassesOnWhatAPersonIsAsked) {
-  progress_.asks("Mount 45°, then type 45.");
-  progress_.asks("");
+  progress_.asks({"Mount 45°, then type 45.", 45, false, "<svg/>"});
+  progress_.asks({});
   const std::vector<json> told = messages();
   ASSERT_EQ(told.size(), 2u);
-  EXPECT_EQ(told[0], json({{"type", "ask"}, {"text", "Mount 45°, then type 45."}}));
-  EXPECT_EQ(told[1], json({{"type", "ask"}, {"text", ""}}));
+  EXPECT_EQ(told[0], json({{"type", "ask"},
+                           {"text", "Mount 45°, then type 45."},
+                           {"occlusion_deg", 45.0},
+                           {"has_power", false},
+                           {"drawing", "<svg/>"}}));
+  EXPECT_EQ(told[1],
+            json({{"type", "ask"}, {"text", ""}, {"occlusion_deg", 0.0}, {"has_power", true}, {"drawing", ""}}));
   EXPECT_THAT(told_.questions, ElementsAre("Mount 45°, then type 45.", ""));
 }
 
@@ -144,11 +149,15 @@ TEST_F(LiveProgressOf, BeginsEveryStepAnew) {
   EXPECT_NEAR(messages().at(0)["thrust_n"].get<double>(), 1, 1e-9);
 }
 
-TEST_F(LiveProgressOf, CountsProgressFromTheLongestTimeLeft) {
+TEST_F(LiveProgressOf, TellsTheShareOfTheCampaignAndTheSamplesOfItsRunsBefore) {
+  position_.done = 0.75;
+  position_.samples_before = 1'000'000;
+  seen_.account.received = 234;
   hold(0, std::chrono::milliseconds(10), 1, 6000);
-  position_.remaining_s = 25;
-  hold(0, std::chrono::milliseconds(10), 1, 6000);
-  EXPECT_DOUBLE_EQ(feed_.newest().progress, 0.75);
+  const json tick = json::parse(tick_message(feed_.newest(), 0, 0));
+  EXPECT_DOUBLE_EQ(tick["progress"], 0.75);
+  EXPECT_EQ(tick["samples"], 1'000'234);
+  EXPECT_EQ(tick["received"], 234);
 }
 
 TEST_F(LiveProgressOf, GivesThePlotterTheLimitsOfTheGuardAtWork) {

@@ -26,7 +26,7 @@ Tick full_tick() {
   Tick tick;
   tick.time_s = 12.34;
   tick.timestamp_s = 1622332812.34;
-  tick.progress = 0.25;
+  tick.position.done = 0.25;
   tick.position = {{"5x3"}, 90, 2, 3, 16, 40, "ramp", from_rpm(7895), 372.4};
   tick.seen.speed_rad_s = from_rpm(7893.6).value();
   tick.seen.thrust_n = 1.1621;

@@ -42,7 +42,10 @@ TEST(Progress, BeginsWithTheRunAndTheShareOfTheCampaignThatIsDone) {
   Position position = in_a_step();
   position.run = 7;
   position.runs = 15;
+  position.done = 0.4399;
   EXPECT_THAT(describe(position, seen()), testing::StartsWith(" 7/15 43 %  5x3  φ  90°  rep 2/3  step 17/40  "));
+  position.done = 0.9999;
+  EXPECT_THAT(describe(position, seen()), testing::StartsWith(" 7/15 99 %  ")) << "100 % is the end";
 }
 
 TEST(Progress, FitsSixtyColumnsWithThrustAndTimeLeft) {
@@ -51,12 +54,13 @@ TEST(Progress, FitsSixtyColumnsWithThrustAndTimeLeft) {
   position.occlusion_deg = 22.5;
   position.commanded = from_rpm(19100);
   position.remaining_s = 36'000;
+  position.done = 0.964;
   const std::string narrow = describe(position, seen(), 60);
   EXPECT_EQ(narrow, "15/15 96 % φ 22.5° 17/40 7894/19100 RPM 1.162 N 10:00:00");
   EXPECT_LE(narrow.size(), 60u + 2) << "φ and ° take two bytes";
   position.step = -1;
   position.phase = "spin down";
-  EXPECT_EQ(describe(position, seen(), 60), "15/15 93 % φ 22.5° spin down 7894/19100 RPM 1.162 N 10:00:00");
+  EXPECT_EQ(describe(position, seen(), 60), "15/15 96 % φ 22.5° spin down 7894/19100 RPM 1.162 N 10:00:00");
 }
 
 TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
@@ -68,6 +72,12 @@ TEST(Progress, ShowsNoNumberForWhatNoLongerComes) {
   observation.motor_age = std::chrono::seconds(2);
   EXPECT_EQ(describe(in_a_step(), observation),
             begin + "   ? of  7895 RPM  thrust      ? N  left 06:12  no speed for 2.0 s  no thrust for 0.8 s");
+}
+
+TEST(Progress, ShowsNoThrustBeforeItsZero) {
+  Observation observation = seen();
+  observation.thrust_n = kUnknown;
+  EXPECT_THAT(describe(in_a_step(), observation), testing::HasSubstr("thrust      – N  left"));
 }
 
 TEST(ProgressByHand, ShowsWhatOneLooksAtWhileTurningAKnob) {

@@ -56,6 +56,17 @@ TEST_P(EverySupply, TellsWhoItIs) {
   EXPECT_TRUE(simulated.truth().writes.empty()) << "to ask who it is writes nothing";
 }
 
+TEST_P(EverySupply, SaysWhatBecomesOfItsKeys) {
+  const bool riden = GetParam().starts_with("RD");
+  const auto keypad = [&] { return ModbusSupply(simulated.address(), clock, kShort).identity().keypad; };
+  EXPECT_EQ(keypad(), riden ? SupplyKeypad::locked : SupplyKeypad::free);
+  simulated.spoil(once(FaultKind::supply_key));
+  EXPECT_TRUE(soon([&] { return simulated.output() || simulated.truth().dead_keys == 1; }));
+  EXPECT_EQ(simulated.output(), !riden) << "a key that is locked switches nothing";
+  simulated.spoil(lasting(FaultKind::supply_keys_free));
+  EXPECT_EQ(keypad(), riden ? SupplyKeypad::said_free : SupplyKeypad::free);
+}
+
 TEST_P(EverySupply, IsSetInItsOwnScale) {
   ModbusSupply supply(simulated.address(), clock, kShort);
   const Limits applied = supply.apply(kTwelveVolts);

@@ -73,6 +73,29 @@ TEST(ModbusScanner, GivesUpAStreamThatIsNotModbus) {
   }
 }
 
+/// Of the keypad: wildekek/rdtech-esphome issue 1, rfinnie/rdserialtool issue 5.
+TEST(SupplySlave, OfARidenLocksItsKeypadWhileItIsAskedAndNoWriteFreesIt) {
+  SupplySettings settings;
+  settings.faults = {{.kind = FaultKind::supply_key, .at = 1s, .count = 1},
+                     {.kind = FaultKind::supply_key, .at = 3s, .count = 1},
+                     {.kind = FaultKind::supply_key, .at = 9s, .count = 1}};
+  SupplySlave slave(settings);
+  const auto output_at = [&](Instant now) { return slave.advance({}, now), slave.circuit().output(); };
+  const auto lock_read_at = [&](Instant now) {
+    const std::vector<std::uint8_t> free{6, 0, 15, 0, 0}, ask{3, 0, 15, 0, 1};
+    for (const auto& pdu : {free, ask})
+      slave.receive(1, ModbusFraming::tcp, modbus_frame(ModbusFraming::tcp, 1, 1, pdu), now);
+    SupplyReply reply;
+    while (slave.next_reply(reply, now + 1s)) continue;
+    return reply.bytes.back();
+  };
+  EXPECT_TRUE(output_at(2s)) << "nobody has asked it yet";
+  EXPECT_EQ(lock_read_at(2500ms), 1);
+  EXPECT_TRUE(output_at(4s)) << "the key is dead";
+  EXPECT_EQ(slave.truth().dead_keys, 1u);
+  EXPECT_FALSE(output_at(9s)) << "nobody has asked it for long";
+}
+
 TEST(ModbusFrame, IsReadBackByTheScanner) {
   for (const ModbusFraming framing : {ModbusFraming::rtu, ModbusFraming::tcp}) {
     const auto frame = modbus_frame(framing, 3, 0x1234, bytes("06 00 12 00 01"));
