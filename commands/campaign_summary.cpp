@@ -53,7 +53,8 @@ void take_campaign(const fs::path& file, CampaignSummary& summary) {
 }
 
 void take_coefficients(const fs::path& file, CampaignSummary& summary) {
-  const compensation::Coefficients fitted = compensation::load_coefficients(file.string());
+  const compensation::Coefficients fitted =
+      compensation::load_coefficients(file.string(), compensation::Need::thrust_coefficient);
   summary.K_T = fitted.curve.thrust_coefficient().value();
   if (fitted.thrust_coefficient) summary.expanded_95 = fitted.thrust_coefficient->expanded_95;
   const auto readiness = fit::readiness_named(fitted.verdict);

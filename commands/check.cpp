@@ -143,6 +143,11 @@ std::string lines_of(const profiles::World& world) {
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.
 std::string uncertainty_of(const compensation::Coefficients& file) {
   const compensation::ThrustCurve& curve = file.curve;
+  if (file.alone())
+    return file.thrust_coefficient
+               ? fmt::format("  speeds     known to {} % without occlusion, standard\n",
+                             two_digits(50 * file.thrust_coefficient->u / curve.thrust_coefficient().value()))
+               : "";
   if (!curve.has_uncertainty()) return "  speeds     uncertainty unknown: the file has no `uncertainty.covariance`\n";
   const auto percent = [&](Radians phi) { return 50 * curve.relative_uncertainty(phi, Radians(0)); };
   std::string more;
@@ -161,6 +166,15 @@ std::string trend_of(const compensation::ThrustCurve& curve) {
                      to_rpm(reference));
 }
 
+std::string curve_of(const compensation::Coefficients& c) {
+  if (c.alone()) return "  curve      none: no occlusion was measured\n";
+  return fmt::format(
+      "  curve      k = {} N/(rad/s)^2{}\n"
+      "  valid      {:g}° to {:g}°, overlap measured as {}\n",
+      words_of(c.curve), c.anchored && c.form == "line" ? ", anchored at K_T" : "", to_degrees(c.smallest_occlusion),
+      to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()));
+}
+
 std::string lines_of(const compensation::Coefficients& c) {
   std::string doubts;
   for (const std::string& doubt : compensation::doubts_of(c)) doubts += "  doubtful   " + doubt + "\n";
@@ -169,13 +183,10 @@ std::string lines_of(const compensation::Coefficients& c) {
       "  origin     {}\n"
       "  verdict    {}\n"
       "  K_T        {:.6g} N/(rad/s)^2 = {:.6g} N/RPM^2\n"
-      "  curve      k = {} N/(rad/s)^2{}\n"
-      "  valid      {:g}° to {:g}°, overlap measured as {}\n"
-      "{}{}{}",
+      "{}{}{}{}",
       c.propeller.id, c.propeller.name, fit::origin_words(c), fit::verdict_words(c),
-      c.curve.thrust_coefficient().value(), to_newtons_per_rpm2(c.curve.thrust_coefficient()), words_of(c.curve),
-      c.anchored && c.form == "line" ? ", anchored at K_T" : "", to_degrees(c.smallest_occlusion),
-      to_degrees(c.curve.largest_fitted()), name_of(c.curve.overlap()), trend_of(c.curve), uncertainty_of(c), doubts);
+      c.curve.thrust_coefficient().value(), to_newtons_per_rpm2(c.curve.thrust_coefficient()), curve_of(c),
+      trend_of(c.curve), uncertainty_of(c), doubts);
 }
 
 std::string lines_of(const sim::FaultFile& file) {
@@ -229,7 +240,9 @@ const std::vector<Kind>& kinds() {
       ours(FileKind::layout, [](Text text, File file) { return fit::describe(fit::parse_layout(text, file.path)); },
            {"header_line"}),
       {"coefficients", compensation::kCoefficientFormat,
-       [](Text, File file) { return lines_of(load_standing_coefficients(file.path)); }},
+       [](Text, File file) {
+         return lines_of(load_standing_coefficients(file.path, compensation::Need::thrust_coefficient));
+       }},
       {"fault script", "kphi-faults/1",
        [](Text text, File file) { return lines_of(sim::parse_faults(text, file.path)); }},
       {"simulated motor", "kphi-sim-motor/1",

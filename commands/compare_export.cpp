@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -53,8 +54,7 @@ ExitCode compare_family(const CompareRequest& request) {
           path + ": not a folder; several propellers are compared from their folders, with steps.csv in them");
     auto [input, fitted] = fitted_again(path);
     if (fitted.identification.alone())
-      throw ConfigurationError(
-          path + ": a log without occlusions; compare two logs at a time, or put all on one page with kphi report");
+      throw ConfigurationError(path + ": a log without occlusions; compare it with logs alone");
     family.push_back(std::move(fitted));
     when.push_back(input.provenance.measured_utc);
   }
@@ -73,7 +73,10 @@ ExitCode compare_family(const CompareRequest& request) {
 std::optional<FitInput> log_of(const std::string& path) {
   const fs::path place(path);
   const bool is_table = !fs::is_directory(place) && place.extension() == ".csv";
-  if (!is_table && (!fs::is_directory(place) || fs::exists(place / "coefficients.yaml"))) return std::nullopt;
+  if (!is_table && !fs::is_directory(place)) return std::nullopt;
+  if (const fs::path file = place / "coefficients.yaml"; !is_table && fs::exists(file))
+    if (!compensation::load_coefficients(file.string(), compensation::Need::thrust_coefficient).alone())
+      return std::nullopt;
   if (!is_table && !fs::exists(place / "steps.csv")) return std::nullopt;
   if (is_table && fs::exists(place.parent_path() / "journal.jsonl"))
     results::require_intact(results::CampaignFolder::open(place.parent_path()));
@@ -86,29 +89,62 @@ std::optional<FitInput> log_of(const std::string& path) {
   return input;
 }
 
-/// Two logs over the speeds that both have, since k of a real propeller rises with speed.
-Comparison compare_logs(const FitInput& a, const FitInput& b, const CompareRequest& request) {
-  Fitted of_a = fitted_log(a), of_b = fitted_log(b);
-  const Identification &one = of_a.identification, &other = of_b.identification;
-  const SpeedRange common{std::max(one.speed_min_rad_s, other.speed_min_rad_s),
-                          std::min(one.speed_max_rad_s, other.speed_max_rad_s)};
-  const auto differs = [&](const Identification& log) {
-    return !same_level(log.speed_min_rad_s, common.min_rad_s) || !same_level(log.speed_max_rad_s, common.max_rad_s);
-  };
-  std::string remark;
-  if (!(common.max_rad_s > common.min_rad_s)) {
-    remark = "they have no range of speeds in common: each over its own";
-  } else if (differs(one) || differs(other)) {
-    remark =
-        fmt::format("compared from {:.0f} to {:.0f} RPM, which both reached; alone, each is fitted over all its speeds",
-                    to_rpm(RadPerSec(common.min_rad_s)), to_rpm(RadPerSec(common.max_rad_s)));
-    of_a = fitted_log(a, common);
-    of_b = fitted_log(b, common);
+struct ComparedLogs {
+  std::vector<ComparedResult> results;
+  std::string remark;  ///< on their speeds; may be empty
+};
+
+/// Logs over the speeds that all of them have, since k of a real propeller rises with speed.
+ComparedLogs over_common_speeds(const std::vector<FitInput>& logs, const std::vector<std::string>& names) {
+  std::vector<Fitted> fitted;
+  SpeedRange common{0, std::numeric_limits<double>::infinity()};
+  for (const FitInput& log : logs) {
+    const Identification& one = fitted.emplace_back(fitted_log(log)).identification;
+    common = {std::max(common.min_rad_s, one.speed_min_rad_s), std::min(common.max_rad_s, one.speed_max_rad_s)};
   }
-  Comparison comparison = compare(result_of_log(of_a, a.provenance.origin, request.results.front()),
-                                  result_of_log(of_b, b.provenance.origin, request.results.back()));
-  if (!remark.empty()) comparison.remarks.push_back(remark);
+  const bool differ = std::ranges::any_of(fitted, [&](const Fitted& one) {
+    const Identification& log = one.identification;
+    return !same_level(log.speed_min_rad_s, common.min_rad_s) || !same_level(log.speed_max_rad_s, common.max_rad_s);
+  });
+  ComparedLogs compared;
+  if (!(common.max_rad_s > common.min_rad_s)) {
+    compared.remark = "they have no range of speeds in common: each over its own";
+  } else if (differ) {
+    compared.remark = fmt::format(
+        "compared from {:.0f} to {:.0f} RPM, which {} reached; alone, each is fitted over all its speeds",
+        to_rpm(RadPerSec(common.min_rad_s)), to_rpm(RadPerSec(common.max_rad_s)), logs.size() == 2 ? "both" : "all");
+    for (std::size_t i = 0; i < logs.size(); ++i) fitted[i] = fitted_log(logs[i], common);
+  }
+  for (std::size_t i = 0; i < logs.size(); ++i)
+    compared.results.push_back(result_of_log(fitted[i], logs[i].provenance.origin, names[i]));
+  return compared;
+}
+
+Comparison compare_logs(const std::vector<FitInput>& logs, const CompareRequest& request) {
+  ComparedLogs compared = over_common_speeds(logs, request.results);
+  Comparison comparison = compare(std::move(compared.results.front()), std::move(compared.results.back()));
+  if (!compared.remark.empty()) comparison.remarks.push_back(compared.remark);
   return comparison;
+}
+
+/// All of them, if each is a log; empty if one is not.
+std::vector<FitInput> logs_of(const std::vector<std::string>& paths) {
+  std::vector<FitInput> logs;
+  for (const std::string& path : paths) {
+    auto log = log_of(path);
+    if (!log) return {};
+    logs.push_back(std::move(*log));
+  }
+  return logs;
+}
+
+/// K_T of several logs side by side.
+ExitCode compare_many(const std::vector<FitInput>& logs, const CompareRequest& request) {
+  if (!request.expect.empty()) throw ConfigurationError("--expect needs exactly two results: it is their verdict");
+  ComparedLogs compared = over_common_speeds(logs, request.results);
+  const SideBySide table = side_by_side(std::move(compared.results), compared.remark);
+  fmt::print("{}", request.json ? side_by_side_json(table) : side_by_side_table(table));
+  return ExitCode::ok;
 }
 
 ComparedResult loaded(const std::optional<FitInput>& log, const std::string& path) {
@@ -131,10 +167,15 @@ ExitCode compare_truth(const CompareRequest& request) {
 ExitCode run_compare(const CompareRequest& request) {
   if (!request.truth.empty()) return compare_truth(request);
   if (request.results.size() < 2) throw ConfigurationError("compare needs two RESULTs, or one RESULT and --truth");
-  if (request.results.size() > 2 || request.claims || !request.predict.empty()) return compare_family(request);
-  const auto a = log_of(request.results.front()), b = log_of(request.results.back());
-  const Comparison comparison = a && b ? compare_logs(*a, *b, request)
-                                       : compare(loaded(a, request.results.front()), loaded(b, request.results.back()));
+  const bool family = request.claims || !request.predict.empty();
+  if (request.results.size() > 2 && !family)
+    if (const auto logs = logs_of(request.results); !logs.empty()) return compare_many(logs, request);
+  if (request.results.size() > 2 || family) return compare_family(request);
+  const auto logs = logs_of(request.results);
+  const Comparison comparison = !logs.empty()
+                                    ? compare_logs(logs, request)
+                                    : compare(loaded(log_of(request.results.front()), request.results.front()),
+                                              loaded(log_of(request.results.back()), request.results.back()));
   fmt::print("{}", request.json ? comparison_json(comparison) : comparison_table(comparison));
   if (request.expect.empty() || request.expect == word(comparison.verdict)) return ExitCode::ok;
   fmt::print(stderr, "kphi: expected that they {}, found: {}\n", request.expect, word(comparison.verdict));
@@ -169,10 +210,10 @@ void export_run(const ExportRequest& request) {
 
 void export_coefficients(const ExportRequest& request) {
   const compensation::Coefficients coefficients =
-      load_standing_coefficients(coefficient_file_of(request.file).string());
+      load_standing_coefficients(coefficient_file_of(request.file).string(), compensation::Need::thrust_coefficient);
   print_standing(coefficients);
   const auto verdict = readiness_named(coefficients.verdict);
-  if (verdict && *verdict >= Readiness::not_yet && !request.accept)
+  if (verdict == Readiness::not_yet && !request.accept)
     throw DataRejected(fmt::format("{}: {}; nothing is exported; --accept does it all the same", coefficients.path,
                                    verdict_words(coefficients)));
   ExportOptions options = request.options;
@@ -207,8 +248,8 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
       "kphi compare results/<5x2> results/<5x3> results/<6x2> results/<6x3> --predict 7x3",
       run_compare);
   add_argument(command, "RESULT", request.results,
-               "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; or the fitted folders of "
-               "one propeller, from four on for a control chart, or of several propellers")
+               "two of: coefficients.yaml, campaign folder, steps.csv without occlusions; any number of imported logs; "
+               "or the fitted folders of one propeller, from four on for a control chart, or of several propellers")
       ->expected(1, 100)
       ->check(kExistingPath);
   command.add_option("--expect", request.expect, "exit with 5 unless this is the verdict")
@@ -241,7 +282,7 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
   command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   add_value(command, "--vehicle", "FILE", request.vehicle,
-            "vehicle file, for targets that compute k from arm angles (c, px4, ros2; ardupilot needs it)")
+            "vehicle file, for targets that compute k from arm angles (c, px4, ros2, ardupilot)")
       ->check(CLI::ExistingFile);
   command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
   command.add_option("--phi-deg", request.options.phi_deg,
@@ -257,12 +298,9 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
           "--turns", [&request = request](const std::string& text) { request.options.turns = parse_turns(text); },
           "how the motors turn, seen from above, for the sign of their torque (px4, gazebo)")
       ->type_name("ccw,cw,…");
-  add_notes(
-      command,
-      "Targets:\n" + footer +
-          "\nkphi lists on stderr what a target cannot hold.\n"
-          "No export to ArduPilot's MOT_THST_EXPO or Betaflight's thrust_linear: they shape the command, they hold "
-          "no k.");
+  add_notes(command, "Targets:\n" + footer +
+                         "\nkphi lists on stderr what a target cannot hold.\n"
+                         "Of a log without occlusions (K_T alone) all but c, and all without --vehicle.");
 }
 
 }  // namespace kphi::commands

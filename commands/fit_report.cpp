@@ -264,18 +264,6 @@ ExitCode refused_or_ok(const FitRequest& request, const Fitted& fitted) {
   return ExitCode::data_rejected;
 }
 
-/// Of a log without occlusions: K_T with its budget and a report, but nothing to fly with.
-ExitCode run_without_occlusions(const FitRequest& request, FitInput& input, const Fitted& fitted) {
-  if (!request.out.empty())
-    throw ConfigurationError(request.path +
-                             ": no occlusion was measured, so no coefficient file can be written; "
-                             "leave --out away");
-  print_findings(request, input, fitted, {});
-  fmt::print(stderr, "{}", caution_text(fitted.identification, fitted.analysis));
-  if (!request.no_report) write_report(fitted, input, input.folder / "report.html");
-  return refused_or_ok(request, fitted);
-}
-
 ExitCode run_fit(const FitRequest& request) {
   FitInput input = load_input(request.path, request.k_unit);
   if (!input.table.empty())
@@ -300,7 +288,6 @@ ExitCode run_fit(const FitRequest& request) {
   if (input.table.empty()) input.provenance.bench = options.bench;
   if (options.bench.calibration_note.empty()) input.provenance.cell_weighed.clear();
   fitted.analysis = analyse(identification, options);
-  if (identification.alone()) return run_without_occlusions(request, input, fitted);
   fs::create_directories(folder);
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);

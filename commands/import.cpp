@@ -139,7 +139,7 @@ ImportedLog write_import(const std::string& path, const Import& import, const st
   print_findings(import, judged, path);
   fmt::print("{}", request.json ? record : fmt::format("{}: {}\n", name, summary_of(table, judged.fits)));
   if (!request.json)
-    for (const std::string& line : judged.throttle) fmt::print("  {}\n", line);
+    for (const std::string& line : throttle_lines(judged.throttle)) fmt::print("  {}\n", line);
   return {{name, judged.fits.front().fit.parameters.k}, spoilt(import, judged), folder.string()};
 }
 
@@ -242,8 +242,9 @@ void add_import(CLI::App& program, ExitCode& exit_code) {
                   "diameter in inches (UIUC default: from the file's name)")
       ->check(CLI::PositiveNumber);
   command
-      .add_option("--air-density-kg-m3", request.options.air_density_kg_m3,
-                  "air density that turns UIUC coefficients into thrust (default 1.225)")
+      .add_option(
+          "--air-density-kg-m3", request.options.air_density_kg_m3,
+          "air density of the log, taken as exact; of a UIUC table, for which thrust is computed (default 1.225)")
       ->check(CLI::PositiveNumber);
   add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: the file's name)");
   command.add_option("--blades", request.options.blades, "number of blades");

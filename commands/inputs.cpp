@@ -153,12 +153,23 @@ std::vector<CurvePoint> averaged_table(std::vector<CurvePoint> table, const fs::
   return averaged.points;
 }
 
-/// What `kphi import` found of the steps that a log's speed comes in; 0: nothing.
-double u_speed_of_log(const fs::path& folder) {
-  if (!fs::is_regular_file(folder / "import.json")) return 0;
-  const auto record = nlohmann::json::parse(results::read_text(folder / "import.json"), nullptr, false);
-  if (!record.is_object() || !record.contains("u_speed_share") || !record["u_speed_share"].is_number()) return 0;
-  return record["u_speed_share"];
+/// What `kphi import` found of a log, beside its steps: those that its speed comes in, and its throttle.
+void take_import(const fs::path& file, FitInput& input) {
+  if (!fs::is_regular_file(file)) return;
+  try {
+    const auto record = nlohmann::json::parse(results::read_text(file));
+    input.u_speed = record.value("u_speed_share", 0.0);
+    for (const auto& law : record.value("throttle_laws", nlohmann::json::array())) {
+      auto& one = input.provenance.throttle.emplace_back();
+      one.name = law.at("law");
+      one.rms_n = law.at("rms_n");
+      one.not_told_from = law.at("not_told_from").get<std::vector<std::string>>();
+      for (const auto& number : law.at("numbers"))
+        one.numbers.push_back({number.at("name"), number.at("value"), number.at("half_95")});
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw ConfigurationError(file.string() + ": not as `kphi import` wrote it; import the log again");
+  }
 }
 
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
@@ -171,7 +182,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
     input.table = averaged_table(read_k_table(text, path.string(), unit_of_k), path);
   } else {
     input.steps = results::parse_steps(text, path.string());
-    input.u_speed = u_speed_of_log(input.folder);
+    take_import(input.folder / "import.json", input);
     input.provenance.origin = results::origin_of(input.steps);
     // A log does not tell whether anything was mounted anew; a campaign's own table, which its campaign does.
     const fs::path campaign = input.folder / "campaign.yaml";
@@ -267,8 +278,8 @@ std::vector<std::string> unlike_journal(const compensation::Coefficients& file, 
   return problems;
 }
 
-compensation::Coefficients load_standing_coefficients(const std::string& path) {
-  compensation::Coefficients file = load_sealed_coefficients(path);
+compensation::Coefficients load_standing_coefficients(const std::string& path, compensation::Need need) {
+  compensation::Coefficients file = load_sealed_coefficients(path, need);
   const fs::path parent = fs::path(path).parent_path();
   if (!fs::exists(parent / "journal.jsonl")) return file;
   const auto folder = results::CampaignFolder::open(parent.empty() ? "." : parent);
@@ -278,8 +289,8 @@ compensation::Coefficients load_standing_coefficients(const std::string& path) {
   return file;
 }
 
-compensation::Coefficients load_sealed_coefficients(const std::string& path) {
-  compensation::Coefficients file = compensation::load_coefficients(path);
+compensation::Coefficients load_sealed_coefficients(const std::string& path, compensation::Need need) {
+  compensation::Coefficients file = compensation::load_coefficients(path, need);
   results::require_seal(results::read_text(path), path);
   return file;
 }

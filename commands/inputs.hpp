@@ -61,10 +61,12 @@ struct FittedFolder {
 /// `--coefficients` and `--vehicle`, both required.
 void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients, std::string& vehicle);
 /// As compensation::load_coefficients. Throws DataRejected if the file was changed since it was written.
-[[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path);
+[[nodiscard]] compensation::Coefficients load_sealed_coefficients(const std::string& path,
+                                                                  compensation::Need need = compensation::Need::curve);
 /// As load_sealed_coefficients. Throws DataRejected, too, if they lie in a campaign folder that is not as kphi left it,
 /// or were fitted from other runs.
-[[nodiscard]] compensation::Coefficients load_standing_coefficients(const std::string& path);
+[[nodiscard]] compensation::Coefficients load_standing_coefficients(
+    const std::string& path, compensation::Need need = compensation::Need::curve);
 /// A line for each run behind them that the journal does not have so.
 [[nodiscard]] std::vector<std::string> unlike_journal(const compensation::Coefficients& file,
                                                       const results::CampaignState& state);

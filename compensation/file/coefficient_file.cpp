@@ -249,12 +249,17 @@ std::optional<ThrustCurve> read_table(const Value& top, ThrustCoefficient k_t, d
   return k ? ThrustCurve::from_table(*k, largest, overlap_of(top)) : std::nullopt;
 }
 
+/// K_T at φ = 0; the smallest range that a curve can have.
+std::optional<ThrustCurve> read_no_curve(const Value& top, ThrustCoefficient k_t, double /*scale*/, Radians /*none*/) {
+  return ThrustCurve::from_line(k_t, k_t, 0, Radians(std::numeric_limits<Real>::min()), overlap_of(top));
+}
+
 /// A form of `curve.form` with what reads it.
 struct FormReader {
   const char* name;
   std::optional<ThrustCurve> (*read)(const Value& top, ThrustCoefficient k_t, double scale, Radians largest);
 };
-constexpr FormReader kForms[] = {{"line", read_line}, {"table", read_table}};
+constexpr FormReader kForms[] = {{"line", read_line}, {"table", read_table}, {Coefficients::kNoCurve, read_no_curve}};
 
 ThrustCurve read_curve(const Value& top, double scale, Radians largest) {
   const ThrustCoefficient k_t = read_thrust_coefficient(top.map_at("K_T"), scale);
@@ -297,6 +302,23 @@ std::pair<double, double> read_occlusions(const Value& top) {
   const auto range = read_range(map, "phi_deg");
   if (range && range->second <= 360.0) return *range;
   node.refuse("`phi_deg` is not a range of occlusions", "write [smallest, largest], at most 360");
+}
+
+/// Of a file with a curve; K_T alone holds at φ = 0.
+std::pair<double, double> occlusions_of(const Value& top, Need need) {
+  const Value form = top.map_at("curve").at("form");
+  if (form.text() != Coefficients::kNoCurve) return read_occlusions(top);
+  if (need == Need::curve)
+    form.refuse("K_T alone, no k(φ): no occlusion was measured", "measure occlusions with `kphi run`, then `kphi fit`");
+  return {0, 0};
+}
+
+Coefficients::ThrottleLaw read_throttle_law(const Value& map) {
+  Coefficients::ThrottleLaw law{map.at("law").text(), map.at("rms_n").number(), {}, {}};
+  for (const Value& number : map.rows("numbers", "a number of a throttle law has no keys"))
+    law.numbers.push_back({number.at("name").text(), number.at("value").number(), number.at("half_95").number()});
+  for (const Value& other : map.list("not_told_from")) law.not_told_from.push_back(other.text());
+  return law;
 }
 
 Coefficients::Row read_row(const Value& map, double scale) {
@@ -372,11 +394,23 @@ void refuse_other_k_t(const Value& top, const Coefficients& coefficients) {
 
 }  // namespace
 
-Coefficients parse_coefficients(const std::string& text, const std::string& path) {
+const Coefficients::ThrottleLaw::Number* Coefficients::ThrottleLaw::find(const std::string& number) const {
+  for (const Number& one : numbers)
+    if (one.name == number) return &one;
+  return nullptr;
+}
+
+const Coefficients::ThrottleLaw* Coefficients::throttle_law(const std::string& name) const {
+  for (const ThrottleLaw& law : throttle)
+    if (law.name == name) return &law;
+  return nullptr;
+}
+
+Coefficients parse_coefficients(const std::string& text, const std::string& path, Need need) {
   const Value top = top_of(text, path);
   refuse_other_format(top);
   const double scale = scale_of_unit(top);
-  const auto [smallest, largest] = read_occlusions(top);
+  const auto [smallest, largest] = occlusions_of(top, need);
   Coefficients coefficients(read_curve(top, scale, from_degrees(largest)));
   coefficients.path = path;
   coefficients.smallest_occlusion = from_degrees(smallest);
@@ -401,6 +435,8 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
     for (const Value& row : top.rows("torque", "a row of the torques has no keys"))
       coefficients.torque.push_back(read_torque(row));
   read_more_of_curve(top, coefficients.torque, coefficients.curve);
+  for (const Value& law : top.rows("throttle", "a throttle law has no keys"))
+    coefficients.throttle.push_back(read_throttle_law(law));
   coefficients.air_density_kg_m3 = top.number_at("air_density_kg_m3");
   coefficients.air_density_u_kg_m3 = top.number_at("air_density_u_kg_m3");
   if (const auto map = top.find("provenance"); map && map->node().IsMap())
@@ -420,7 +456,7 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   return coefficients;
 }
 
-Coefficients load_coefficients(const std::string& path) {
+Coefficients load_coefficients(const std::string& path, Need need) {
   constexpr std::size_t kLargest = 1 << 20;
   const std::string next_move = "; give the coefficients.yaml that `kphi fit` wrote";
   std::error_code error;
@@ -433,7 +469,7 @@ Coefficients load_coefficients(const std::string& path) {
     throw CoefficientError(path + ": cannot be read (" + std::strerror(errno) + ")" + next_move);
   text.resize(static_cast<std::size_t>(file.gcount()));
   if (text.size() > kLargest) throw CoefficientError(path + ": is larger than 1 MiB" + next_move);
-  return parse_coefficients(text, path);
+  return parse_coefficients(text, path, need);
 }
 
 std::string words_of(const ThrustCurve& curve) {

@@ -1,6 +1,7 @@
 // Reads the coefficient file that `kphi fit` writes (format kphi-coefficients/2). For the ground: allocates and throws.
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -61,6 +62,20 @@ struct Coefficients {
     std::string file;
     std::string sha256;
   };
+  /// Law of thrust over throttle of the log behind the file, in the words of one flight stack.
+  struct ThrottleLaw {
+    struct Number {
+      std::string name;  ///< as the stack calls it
+      double value = 0;
+      double half_95 = 0;  ///< half of the 95 % interval
+    };
+    std::string name;  ///< "px4", "ardupilot", …
+    double rms_n = 0;  ///< of the rows about the law, N
+    std::vector<Number> numbers;
+    std::vector<std::string> not_told_from;  ///< laws that the rows cannot tell from this one
+    /// nullptr if the law has no such number.
+    [[nodiscard]] const Number* find(const std::string& number) const;
+  };
   /// How the coefficients were fitted, in the words of `kphi fit`; empty in a file that does not say.
   struct Fit {
     std::string k_by, weights, loss, curve_loss;
@@ -99,17 +114,28 @@ struct Coefficients {
   std::optional<RadPerSec> slowest_speed;  ///< valid range of speeds
   std::optional<RadPerSec> fastest_speed;
   std::vector<Row> table;
-  std::vector<Torque> torque;  ///< ascending φ; empty if it was not measured
+  std::vector<Torque> torque;         ///< ascending φ; empty if it was not measured
+  std::vector<ThrottleLaw> throttle;  ///< empty: no log with a throttle is behind the file
   std::optional<double> air_density_kg_m3, air_density_u_kg_m3;
   Provenance provenance;
+
+  /// K_T alone, of a log without occlusions: `curve` is K_T at φ = 0 and knows no other φ.
+  [[nodiscard]] bool alone() const { return form == kNoCurve; }
+  /// nullptr if the file has no such law.
+  [[nodiscard]] const ThrottleLaw* throttle_law(const std::string& name) const;
+  static constexpr const char* kNoCurve = "none";
 };
+
+/// What is asked of a file: k(φ), for whatever flies, or K_T alone will do.
+enum class Need : std::uint8_t { curve, thrust_coefficient };
 
 /// Refuses a file of another format, without k_unit or overlap, with a K_T that is not positive, with numbers that are
 /// not finite, with a key given twice, or with a required key missing. Other keys than the known ones are let pass.
 /// Throws CoefficientError.
-[[nodiscard]] Coefficients load_coefficients(const std::string& path);
+[[nodiscard]] Coefficients load_coefficients(const std::string& path, Need need = Need::curve);
 /// As load_coefficients, from text; `path` only names it in messages.
-[[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path);
+[[nodiscard]] Coefficients parse_coefficients(const std::string& text, const std::string& path,
+                                              Need need = Need::curve);
 
 /// k(φ) in N/(rad/s)² for people: "1.59668e-06 - 2.5658e-07 phi/rad", "1.55e-06 at 0, 1.39e-06 at 45 deg".
 [[nodiscard]] std::string words_of(const ThrustCurve& curve);

@@ -204,7 +204,8 @@ void add_file(py::module_& module) {
                              [](const Coefficients& c) { return value_or_none(c.air_density_kg_m3); })
       .def_property_readonly("thrust_error_95",
                              [](const Coefficients& c) { return value_or_none(c.thrust_error.share_95); });
-  module.def("load_coefficients", &load_coefficients, py::arg("path"));
+  module.def(
+      "load_coefficients", [](const std::string& path) { return load_coefficients(path); }, py::arg("path"));
 }
 
 void add_airframe(py::module_& module) {

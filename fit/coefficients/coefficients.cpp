@@ -90,9 +90,11 @@ std::string curve_block(const Fitted& fitted) {
   const CurveFit& fit = fitted.identification.curve_fit;
   std::vector<double> points;
   for (const CurvePoint& point : fit.points) points.push_back(point.phi_deg);
-  std::string text = "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
-                     fmt::format("curve:\n  form: {}\n  anchored: {}\n  points_deg: {}\n", name_of(fit.form),
-                                 fit.anchored, list(points));
+  std::string text =
+      "K_T: " + entry_of(fitted.analysis.coefficients.front(), ", phi_deg: 0.0", "") +
+      fmt::format("curve:\n  form: {}\n  anchored: {}\n  points_deg: {}\n",
+                  fitted.identification.alone() ? compensation::Coefficients::kNoCurve : name_of(fit.form),
+                  fitted.identification.alone() || fit.anchored, list(points));
   bool knots = false;
   for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
     const CurveParameter& one = fit.parameters[i];
@@ -115,10 +117,11 @@ std::string trend_block(const Analysis& analysis) {
 }
 
 std::string valid_block(const Identification& identification) {
-  std::string text = "valid: {phi_deg: " + list({0, identification.table.back().phi_deg});
+  std::vector<std::string> ranges;
+  if (!identification.alone()) ranges.push_back("phi_deg: " + list({0, identification.table.back().phi_deg}));
   if (speeds_known(identification))
-    text += ", speed_rpm: " + speed_range(identification.speed_min_rad_s, identification.speed_max_rad_s);
-  return text + "}\n";
+    ranges.push_back("speed_rpm: " + speed_range(identification.speed_min_rad_s, identification.speed_max_rad_s));
+  return fmt::format("valid: {{{}}}\n", fmt::join(ranges, ", "));
 }
 
 std::string table_row(const Fitted& fitted, std::size_t i) {
@@ -228,6 +231,21 @@ std::string analysis_blocks(const Analysis& analysis) {
   return text;
 }
 
+/// Of the log's supply and speed controller.
+std::string throttle_block(const Provenance& provenance) {
+  if (provenance.throttle.empty()) return {};
+  std::string text = "throttle:  # laws of thrust over throttle of the log; half_95 by the scatter of its rows\n";
+  for (const auto& law : provenance.throttle) {
+    std::vector<std::string> numbers;
+    for (const auto& one : law.numbers)
+      numbers.push_back(fmt::format("{{name: {}, value: {}, half_95: {}}}", quoted(one.name), yaml_number(one.value),
+                                    yaml_number(one.half_95)));
+    text += fmt::format("  - {{law: {}, rms_n: {}, numbers: [{}], not_told_from: [{}]}}\n", law.name,
+                        yaml_number(law.rms_n), fmt::join(numbers, ", "), fmt::join(law.not_told_from, ", "));
+  }
+  return text;
+}
+
 /// The value with this name; the first if the file has none.
 template <class Enum, std::size_t n>
 Enum named(const std::string& name, const char* key, const std::string& path, const std::array<Enum, n>& values) {
@@ -253,7 +271,7 @@ std::string estimator_words(const Identification& identification) {
     text += fmt::format(", weighted by {}",
                         identification.options.weighting == Weighting::thrust ? "u(T)" : "u(T) and u(w)");
   if (identification.options.loss != Loss::none) text += fmt::format(", {} loss", name_of(identification.options.loss));
-  return text + fmt::format(", then a {} through k(phi){}", form, by);
+  return identification.alone() ? text : text + fmt::format(", then a {} through k(phi){}", form, by);
 }
 
 std::string format_coefficients(const Fitted& fitted, const Provenance& provenance) {
@@ -261,13 +279,15 @@ std::string format_coefficients(const Fitted& fitted, const Provenance& provenan
   std::string text = head(identification, provenance) + curve_block(fitted) + trend_block(fitted.analysis) +
                      valid_block(identification) + "table:\n";
   for (std::size_t i = 0; i < identification.table.size(); ++i) text += table_row(fitted, i);
-  text += provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis);
-  (void)compensation::parse_coefficients(text, "coefficients.yaml");  // what cannot be read again is not written
+  text += provenance_block(fitted, provenance) + analysis_blocks(fitted.analysis) + throttle_block(provenance);
+  (void)compensation::parse_coefficients(
+      text, "coefficients.yaml",
+      compensation::Need::thrust_coefficient);  // what cannot be read again is not written
   return results::sealed(std::move(text));
 }
 
 RecordedFit read_recorded_fit(const std::string& path) {
-  const auto file = compensation::load_coefficients(path);
+  const auto file = compensation::load_coefficients(path, compensation::Need::thrust_coefficient);
   const auto& fit = file.provenance.fit;
   RecordedFit record;
   IdentificationOptions& options = record.options;
@@ -275,8 +295,10 @@ RecordedFit read_recorded_fit(const std::string& path) {
   options.diameter_in = file.propeller.diameter_in;
   options.blades = file.propeller.blades;
   options.overlap = file.curve.overlap();
-  options.curve.form = named(file.form, "form", path, kCurveForms);
-  options.curve.anchored = file.anchored;
+  if (!file.alone()) {
+    options.curve.form = named(file.form, "form", path, kCurveForms);
+    options.curve.anchored = file.anchored;
+  }
   for (const Radians& point : file.points) options.curve.points_deg.push_back(to_degrees(point));
   if (!file.table.empty() && file.table.front().at_speed) options.at_speed_rad_s = file.table.front().at_speed->value();
   if (fit.speed_range_rpm) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
 #include "fit/uncertainty/analysis.hpp"
 #include "fit/uncertainty/budget.hpp"
@@ -48,8 +49,9 @@ struct Provenance {
   std::optional<MotorClock> clock;  ///< of a campaign
   std::vector<RejectedRun> rejected{};
   std::string cell_weighed{};  ///< one line: when, with what, and what it said of the load cell; empty: it was not
-  std::optional<BenchUncertainty> bench{};  ///< of the budget
-  std::string stand{}, operator_name{};     ///< of a campaign: names of bench file and person; empty: unknown
+  std::optional<BenchUncertainty> bench{};                          ///< of the budget
+  std::vector<compensation::Coefficients::ThrottleLaw> throttle{};  ///< of an imported log with a throttle
+  std::string stand{}, operator_name{};  ///< of a campaign: names of bench file and person; empty: unknown
 };
 
 /// The estimator in words; the same in file and report.

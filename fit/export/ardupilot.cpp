@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "fit/export/facts.hpp"
@@ -39,12 +41,51 @@ std::string vehicle_in_lua(const FlownVehicle& vehicle) {
       yaml_number(vehicle.masses.at_hubs[0]), reference, one_line(vehicle.reference_name));
 }
 
+/// Of the two laws of a log the one with the voltage, where it describes the rows better.
+Export expo_of(const compensation::Coefficients& file) {
+  const auto* law = &throttle_law_for(file, "ardupilot");
+  const auto* const by_voltage = file.throttle_law("ardupilot_voltage");
+  const bool scaled = by_voltage != nullptr && by_voltage->rms_n < law->rms_n &&
+                      std::ranges::count(law->not_told_from, by_voltage->name) == 0;
+  if (scaled) law = by_voltage;
+  const double fitted = number_of(file, *law, "MOT_THST_EXPO"), taken = std::clamp(fitted, -1.0, 1.0);
+  Export result;
+  result.text = comment(file, "# ") + "# " + words_of(*law, "MOT_THST_EXPO") + "\n" +
+                fmt::format("MOT_THST_EXPO,{:.4f}\n", taken);
+  for (const char* name : {"MOT_SPIN_MIN", "MOT_SPIN_MAX"})
+    result.text += fmt::format("{},{:g}\n", name, number_of(file, *law, name));
+  if (scaled) {
+    result.text += fmt::format(
+        "# the log's voltage is that at the motors: option 1 compensates by it, not by the resting voltage\n"
+        "MOT_BAT_VOLT_MAX,{:.2f}\nMOT_OPTIONS,1\n",
+        number_of(file, *law, "MOT_BAT_VOLT_MAX"));
+    result.lost.emplace_back(
+        "MOT_BAT_VOLT_MIN: the battery's, which the log does not know; below 0.6 of the largest ArduPilot ends at "
+        "that");
+  } else {
+    result.lost.emplace_back(
+        "MOT_BAT_VOLT_MAX, MOT_BAT_VOLT_MIN: the log does not tell how thrust goes with the voltage; the exponent is "
+        "that of its supply");
+  }
+  result.lost.emplace_back(
+      "MOT_SPIN_MIN, MOT_SPIN_MAX: ArduPilot's defaults, by which the exponent was fitted; with others it is another");
+  if (taken != fitted)
+    result.lost.push_back(fmt::format("MOT_THST_EXPO {:.3g}: ArduPilot takes -1 to 1; {:g} is written", fitted, taken));
+  result.lost.emplace_back(
+      "k: ArduPilot commands shares of a full motor; name the --vehicle for the script with k(phi)");
+  return result;
+}
+
 }  // namespace
 
 /// A script for AP_MotorsMatrix_Scripting_Dynamic: the factors of throttle, roll, pitch and yaw follow the arms.
 Export to_ardupilot(const compensation::Coefficients& file, const ExportOptions& options) {
   const auto vehicle = flown_vehicle(file, options);
-  if (!vehicle) throw ConfigurationError("--to ardupilot: the script computes k from arm angles; name the --vehicle");
+  if (!vehicle && file.throttle.empty())
+    throw ConfigurationError(
+        "--to ardupilot: the script computes k from arm angles; name the --vehicle; MOT_THST_EXPO alone needs a log "
+        "with throttle");
+  if (!vehicle) return expo_of(file);
   if (file.curve.overlap() != compensation::OverlapMeasure::rim_arc)
     throw ConfigurationError(
         fmt::format("{}: the script knows the rim_arc alone, these coefficients are flown with the {}", file.path,

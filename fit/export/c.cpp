@@ -138,6 +138,7 @@ std::string vehicle_in_c(const FlownVehicle& vehicle, const std::string& name) {
 
 /// For kphi_compensation.h, in float or double as the library was built.
 Export to_c(const compensation::Coefficients& file, const ExportOptions& options) {
+  require_curve(file, "kphi_curve");
   const std::string name = identifier(file.propeller.id);
   Export result;
   for (const std::string& line : provenance_lines(file)) result.text += "// " + comment_safe(line) + "\n";

@@ -35,8 +35,15 @@ std::string uncertainty_words(const compensation::Coefficients& file) {
 
 }  // namespace
 
+void require_curve(const compensation::Coefficients& file, const std::string& what) {
+  if (!file.alone()) return;
+  throw ConfigurationError(
+      fmt::format("{}: K_T alone, no k(φ): {} needs occlusions; measure them with `kphi run`", file.path, what));
+}
+
 /// K_T k_i(φ), as it flies (ScalingLaw::clamped), N/(rad/s)². Throws ConfigurationError for a φ beyond the file's.
 double coefficient_at(const compensation::Coefficients& file, double phi_deg) {
+  if (phi_deg != 0) require_curve(file, "--phi-deg");
   if (!(phi_deg >= 0) || phi_deg > to_degrees(file.curve.largest_fitted()) + 1e-9) {
     throw ConfigurationError(fmt::format("{}: --phi-deg {} is outside the measured occlusions, 0 to {:g}", file.path,
                                          phi_deg, to_degrees(file.curve.largest_fitted())));
@@ -74,6 +81,33 @@ std::optional<TorquePerThrust> torque_per_thrust(const compensation::Coefficient
 std::string words_of(const TorquePerThrust& torque) {
   return torque.u ? fmt::format("{:.4g} ± {:.2g} m (95 %)", torque.value, coverage_factor(kNormal, 0.95) * *torque.u)
                   : fmt::format("{:.4g} m", torque.value);
+}
+
+std::string words_of(const compensation::Coefficients::ThrottleLaw& law, const std::string& number) {
+  const auto* const found = law.find(number);
+  std::string text = found == nullptr ? law.name
+                                      : fmt::format("{} {} (95 %, by the scatter of the log's rows)", number,
+                                                    plain_with_error(found->value, found->half_95));
+  text += "; it holds for the supply and the speed controller of the log";
+  if (!law.not_told_from.empty())
+    text += fmt::format("; its rows cannot tell this law from that of {}", fmt::join(law.not_told_from, ", "));
+  return one_line(text);
+}
+
+const compensation::Coefficients::ThrottleLaw& throttle_law_for(const compensation::Coefficients& file,
+                                                                const std::string& name) {
+  if (const auto* const law = file.throttle_law(name)) return *law;
+  throw ConfigurationError(
+      fmt::format("{}: no throttle law for {}: it needs a log with throttle{}; import one with `kphi import`, then "
+                  "`kphi fit`",
+                  file.path, name, name == "crazyflie" ? " and voltage" : ""));
+}
+
+double number_of(const compensation::Coefficients& file, const compensation::Coefficients::ThrottleLaw& law,
+                 const std::string& name) {
+  if (const auto* const number = law.find(name)) return number->value;
+  throw ConfigurationError(
+      fmt::format("{}: the throttle law {} has no {}; fit again with this kphi", file.path, one_line(law.name), name));
 }
 
 /// Throws ConfigurationError unless there is one direction for each motor, or none at all.
@@ -120,7 +154,8 @@ std::string json_text(const std::string& text) {
 }
 
 /// Why a target with one constant loses k(φ).
-std::string no_phi(const char* target, double phi_deg) {
+std::string no_phi(const compensation::Coefficients& file, const char* target, double phi_deg) {
+  if (file.alone()) return fmt::format("k(phi): no occlusion was measured; {} has K_T alone", target);
   return fmt::format(
       "k(phi): {} has one constant per motor and cannot change it in flight; this one is for phi = {:g} deg, use the "
       "compensation library for the others",
@@ -199,6 +234,7 @@ compensation::Position middle_of(const compensation::Airframe& airframe) {
 
 std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file, const ExportOptions& options) {
   if (options.vehicle == nullptr) return std::nullopt;
+  require_curve(file, "a vehicle that morphs");
   const profiles::Vehicle& vehicle = *options.vehicle;
   if (const auto mismatch =
           compensation::overlap_mismatch(file.curve.overlap(), file.path, vehicle.overlap, vehicle.path))

@@ -10,6 +10,9 @@
 
 namespace kphi::fit {
 
+/// Throws ConfigurationError for a file of K_T alone; `what`: "the script".
+void require_curve(const compensation::Coefficients& file, const std::string& what);
+
 /// K_T k_i(φ), as it flies (ScalingLaw::clamped), N/(rad/s)². Throws ConfigurationError for a φ beyond the file's.
 [[nodiscard]] double coefficient_at(const compensation::Coefficients& file, double phi_deg);
 /// rad/s at full output: the option, else the vehicle's, else the file's. Throws ConfigurationError without any.
@@ -26,6 +29,17 @@ struct TorquePerThrust {
 [[nodiscard]] std::string words_of(const TorquePerThrust& torque);
 inline constexpr const char* kNoTorque =
     "torque: the coefficient file has none; measure it with the load cell's torque axis";
+
+/// The law and what of it cannot be told, as a line of a comment or of what is left out: "THR_MDL_FAC 0.35 ± 0.02 (95
+/// %, by the scatter of the log's rows; holds for its supply and speed controller); these rows cannot tell it from …".
+[[nodiscard]] std::string words_of(const compensation::Coefficients::ThrottleLaw& law, const std::string& number);
+
+/// The law of that name. Throws ConfigurationError, with what to do, for a file without it.
+[[nodiscard]] const compensation::Coefficients::ThrottleLaw& throttle_law_for(const compensation::Coefficients& file,
+                                                                              const std::string& name);
+/// Throws ConfigurationError for a law without it.
+[[nodiscard]] double number_of(const compensation::Coefficients& file,
+                               const compensation::Coefficients::ThrottleLaw& law, const std::string& name);
 
 /// Throws ConfigurationError unless there is one direction for each motor, or none at all.
 void require_turns(const ExportOptions& options);
@@ -78,7 +92,7 @@ struct FlownVehicle {
 [[nodiscard]] const char* ardupilot_script();
 
 /// Why a target with one constant loses k(φ).
-[[nodiscard]] std::string no_phi(const char* target, double phi_deg);
+[[nodiscard]] std::string no_phi(const compensation::Coefficients& file, const char* target, double phi_deg);
 /// Says so where k changes with the speed and the target cannot hold that.
 void say_trend(const compensation::Coefficients& file, Export& result);
 

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "fit/export/facts.hpp"
@@ -107,12 +109,33 @@ void add_turns(ParameterText& to, const compensation::Coefficients& file, const 
   result.lost.emplace_back("body and arms: name the vehicle with --vehicle for the morphing child");
 }
 
+/// How the outputs become thrust; a line for the file's head.
+std::string add_throttle(ParameterText& to, const compensation::Coefficients& file, Export& result) {
+  const auto* const law = file.throttle_law("px4");
+  if (law == nullptr) {
+    to.number("THR_MDL_FAC", 1);
+    result.lost.emplace_back(
+        "THR_MDL_FAC 1.0 is right only for motors that hold a commanded speed; ordinary speed controllers need 0.2 to "
+        "0.5: import a log with throttle, and fit and export that");
+    return "# THR_MDL_FAC 1.0: only for motors that hold a commanded speed\n";
+  }
+  const double fitted = number_of(file, *law, "THR_MDL_FAC"), taken = std::clamp(fitted, 0.0, 1.0);
+  to.number("THR_MDL_FAC", taken);
+  const std::string words = words_of(*law, "THR_MDL_FAC") + "; for 1000 to 2000 us, or the ends of the log's throttle";
+  result.lost.push_back("interval of the throttle law: " + words);
+  if (taken != fitted)
+    result.lost.push_back(
+        fmt::format("THR_MDL_FAC {:.3g}: PX4 takes 0 to 1 and counts others as 0; {:g} is written", fitted, taken));
+  return "# " + words + "\n";
+}
+
 }  // namespace
 
 /// Parameters as QGroundControl loads them. Control allocation takes thrust = CT u², u the normalised output, so that
-/// CT = k ω_max² in N where the output is proportional to speed (a speed-controlled motor); THR_MDL_FAC = 1 says so.
-/// Torque = KM · thrust, KM in m, negative for a rotor that turns clockwise: a wrong sign would crash the vehicle, so
-/// it is written only where the directions are known. With a vehicle: all that the morphing child reads.
+/// CT = k ω_max² in N at full output. THR_MDL_FAC is that of the log's throttle; without one it is 1, which is true
+/// where the output is proportional to speed (a speed-controlled motor). Torque = KM · thrust, KM in m, negative for a
+/// rotor that turns clockwise: a wrong sign would crash the vehicle, so it is written only where the directions are
+/// known. With a vehicle: all that the morphing child reads.
 Export to_px4(const compensation::Coefficients& file, const ExportOptions& options) {
   constexpr double kLargestCt = 100;  // module.yaml of control_allocator
   const double speed_max = speed_max_of(file, options);
@@ -140,12 +163,12 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
         "k(phi) in PX4's own multirotor: its CA_ROTORn_CT cannot change in flight; KPHI_... are for the morphing child "
         "(compensation/integrations/px4.md)");
   } else {
-    result.lost.push_back(no_phi("CA_ROTORn_CT", options.phi_deg));
+    result.lost.push_back(no_phi(file, "CA_ROTORn_CT", options.phi_deg));
     add_turns(parameters, file, options, result);
     say_trend(file, result);
   }
-  parameters.number("THR_MDL_FAC", 1);
-  result.text = comment(file, "# ") +
+  const std::string throttle = add_throttle(parameters, file, result);
+  result.text = comment(file, "# ") + throttle +
                 fmt::format(
                     "# phi = {:g} deg; CT in N at {:.0f} RPM, thrust = CT u^2 with u proportional to speed\n"
                     "# Vehicle-Id Component-Id Name Value Type\n",

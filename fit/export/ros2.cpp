@@ -50,6 +50,23 @@ void add_table(const compensation::Coefficients& file, Parameters& parameters) {
   parameters.list("k_expanded_95_n_s2_per_rad2", expanded);
 }
 
+void add_curve(const compensation::ThrustCurve& curve, Parameters& parameters) {
+  curve.visit(
+      [&](const compensation::Line& line) {
+        parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
+        parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
+        if (const auto& u = line.uncertainty)
+          parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
+      },
+      [&](const compensation::OcclusionTable& table) {
+        std::vector<double> phi, k;
+        for (const compensation::Knot& knot : table) phi.push_back(knot.occlusion.value()), k.push_back(knot.value);
+        parameters.list("curve_phi_rad", phi);
+        parameters.list("curve_k_n_s2_per_rad2", k);
+      });
+  parameters.number("phi_max_rad", curve.largest_fitted().value());
+}
+
 /// The names of integrations/ros2_compensator_node.cpp. Joints: arm_1 and so on, unless the robot has other names.
 std::string vehicle_parameters(const FlownVehicle& vehicle) {
   const compensation::Airframe& airframe = vehicle.airframe;
@@ -111,19 +128,7 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions& opti
   parameters.number("thrust_coefficient_u_n_s2_per_rad2", K_T ? std::optional(K_T->u) : std::nullopt);
   parameters.number("thrust_coefficient_expanded_95_n_s2_per_rad2",
                     K_T ? std::optional(K_T->expanded_95) : std::nullopt);
-  file.curve.visit(
-      [&](const compensation::Line& line) {
-        parameters.number("line_intercept_n_s2_per_rad2", line.intercept.value());
-        parameters.number("line_slope_n_s2_per_rad3", line.slope_per_rad);
-        if (const auto& u = line.uncertainty)
-          parameters.list("line_covariance", {u->intercept_variance, u->covariance, u->covariance, u->slope_variance});
-      },
-      [&](const compensation::OcclusionTable& table) {
-        std::vector<double> phi, k;
-        for (const compensation::Knot& knot : table) phi.push_back(knot.occlusion.value()), k.push_back(knot.value);
-        parameters.list("curve_phi_rad", phi);
-        parameters.list("curve_k_n_s2_per_rad2", k);
-      });
+  if (!file.alone()) add_curve(file.curve, parameters);
   if (const auto numbers = numbers_of(file); !numbers.torque.empty()) {
     std::vector<double> phi, share;
     for (const compensation::Knot& knot : numbers.torque)
@@ -135,7 +140,6 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions& opti
     parameters.number("speed_trend_s_per_rad", trend.per_rad_s);
     parameters.number("speed_trend_reference_rad_s", trend.reference.value());
   }
-  parameters.number("phi_max_rad", file.curve.largest_fitted().value());
   parameters.number("speed_min_rad_s", value_of(file.slowest_speed));
   parameters.number("speed_max_rad_s", value_of(file.fastest_speed));
   parameters.number("air_density_kg_m3", file.air_density_kg_m3);
@@ -146,7 +150,8 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions& opti
   result.lost = {
       "hashes of the runs: only in the coefficient file",
       "the covariance's shape: parameters have no matrices; it is row by row, in the order of the parameters"};
-  if (options.vehicle == nullptr)
+  if (file.alone()) result.lost.push_back(no_phi(file, "the file", 0));
+  if (options.vehicle == nullptr && !file.alone())
     result.lost.emplace_back("body and arms: kphi's node needs them; name the vehicle with --vehicle");
   if (!parameters.unknown.empty())
     result.lost.push_back("unknown values: parameters have no null; left out: " + parameters.unknown);

@@ -31,7 +31,7 @@ Export to_agilicious(const compensation::Coefficients& file, const ExportOptions
   if (file.slowest_speed)
     result.text +=
         fmt::format("motor_omega_min: {}  # rad/s, the slowest measured\n", yaml_number(file.slowest_speed->value()));
-  result.lost = {no_phi("thrust_map", options.phi_deg),
+  result.lost = {no_phi(file, "thrust_map", options.phi_deg),
                  "uncertainties, air density: the file has no keys for them; see its comments"};
   if (!kappa) result.lost.emplace_back(kNoTorque);
   say_trend(file, result);
@@ -67,7 +67,7 @@ Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& op
   }
   result.text += "  </model>\n</sdf>\n";
   result.lost = {
-      no_phi("MulticopterMotorModel", options.phi_deg),
+      no_phi(file, "MulticopterMotorModel", options.phi_deg),
       "time constants: not in the coefficient file; timeConstantUp and timeConstantDown keep the plugin's defaults",
       "names of joints and links: rotor_N; replace them with the model's"};
   if (!moment) result.lost.emplace_back(kNoTorque);

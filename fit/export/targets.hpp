@@ -45,7 +45,12 @@ struct Export {
 [[nodiscard]] Export to_px4(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_gazebo(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_ros2(const compensation::Coefficients& file, const ExportOptions& options);
+/// With a vehicle the script; without one MOT_THST_EXPO, of a file with a throttle law.
 [[nodiscard]] Export to_ardupilot(const compensation::Coefficients& file, const ExportOptions& options);
+/// thrust_linear, of a file with a throttle law.
+[[nodiscard]] Export to_betaflight(const compensation::Coefficients& file, const ExportOptions& options);
+/// VMOTOR2THRUST0 to 3, of a file with the law of a log that has throttle and voltage.
+[[nodiscard]] Export to_crazyflie(const compensation::Coefficients& file, const ExportOptions& options);
 [[nodiscard]] Export to_c(const compensation::Coefficients& file, const ExportOptions& options);
 /// phi_deg, k and its u first: `kphi fit` reads the table.
 [[nodiscard]] Export to_csv(const compensation::Coefficients& file, const ExportOptions& options);

@@ -99,7 +99,10 @@ std::vector<Import> import_logs(StandLog log, RowSelection selection) {
 }
 
 Import import_uiuc(TextBlocks text, const std::string& path, const ImportOptions& options) {
-  Import import{read_uiuc(std::move(text), path, options.diameter_in, options.air_density_kg_m3), {}, {}};
+  Import import{
+      read_uiuc(std::move(text), path, options.diameter_in, options.air_density_kg_m3.value_or(kUiucDensityKgM3)),
+      {},
+      {}};
   for (const TableProblem& problem : import.table.problems)
     import.findings.push_back({FindingKind::other_fields, 1, problem.line, problem.what, { problem.line }});
   return import;
@@ -186,6 +189,7 @@ std::vector<Import> import_groups(TextBlocks text, const std::string& path, cons
     if (!import.group.empty()) import.table.propeller += ", " + import.group;
     if (options.diameter_in) import.table.diameter_in = *options.diameter_in;
     import.table.blades = options.blades;
+    import.table.air_density_kg_m3 = options.air_density_kg_m3.value_or(results::kNotMeasured);
   }
   return imports;
 }
@@ -228,6 +232,15 @@ std::string import_record(const Import& import, const JudgedFit& judged, const s
   Json problems = Json::array();
   for (const TableProblem& problem : import.table.problems)
     problems.push_back({{"line", problem.line}, {"what", problem.what}});
+  Json throttle = Json::array();
+  for (const ThrottleLaw& law : judged.throttle) {
+    Json& one = throttle.emplace_back(Json{{"law", name_of(law.form)}, {"rows", law.n}});
+    KPHI_JSON_MEMBERS(one, law, rms_n);
+    one["numbers"] = one["not_told_from"] = Json::array();
+    for (const ThrottleParameter& number : law.parameters)
+      KPHI_JSON_MEMBERS(one["numbers"].emplace_back(), number, name, value, half_95);
+    for (const ThrottleForm other : law.not_told_from) one["not_told_from"].push_back(name_of(other));
+  }
   Json record{{"format", "kphi-import/1"},
               {"source", path},
               {"sha256", sha256},
@@ -241,7 +254,7 @@ std::string import_record(const Import& import, const JudgedFit& judged, const s
               {"u_speed_share", judged.u_speed},
               {"propeller", import.table.propeller},
               {"k_means_nothing", spoilt(import, judged)},
-              {"throttle_laws", judged.throttle},
+              {"throttle_laws", throttle},
               {"columns_left_out", import.table.unread},
               {"findings", findings},
               {"lines_left_out", problems}};

@@ -41,9 +41,9 @@ struct ImportOptions {
   LayoutHints hints;
   std::optional<Layout> layout{};  ///< known, not to be found
   std::optional<double> diameter_in{};
-  double air_density_kg_m3 = kUiucDensityKgM3;  ///< of a UIUC table
-  std::string propeller;                        ///< default: the file's name without ending
-  int blades = 0;                               ///< 0: unknown
+  std::optional<double> air_density_kg_m3{};  ///< of the log; a UIUC table is computed for it
+  std::string propeller;                      ///< default: the file's name without ending
+  int blades = 0;                             ///< 0: unknown
 };
 
 struct Import {

@@ -9,7 +9,6 @@
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
 #include "fit/logs/row_groups.hpp"
-#include "fit/logs/throttle_law.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -105,7 +104,7 @@ void audit_unlike(ImportedTable& table, std::vector<LogFinding>& findings) {
   constexpr double kFar = 8, kShare = 0.10, kMost = 0.2;
   const double strong = kStrong * strongest(table);
   std::vector<LogPoint> points;
-  for (std::size_t i = 0; i < table.size(); ++i)
+  for (std::size_t i = 0; i < table.size() && points.size() <= kFew; ++i)
     if (table.thrust_n(i) > strong && !table.is_left_out(i))
       points.push_back({std::log(table.speed_rad_s(i)), std::log(table.thrust_n(i)), i});
   if (points.size() < kFewest || points.size() > kFew) return;
@@ -221,7 +220,7 @@ void leave_out_obvious(ImportedTable& table) {
 
 JudgedFit judged_fit(const ImportedTable& table) {
   JudgedFit judged;
-  judged.throttle = throttle_lines(table);
+  judged.throttle = throttle_laws(table);
   const double step = speed_step_rpm(table);
   const double share = step > 0 ? share_of_step(table, from_rpm(step / 2).value()) : 0;
   judged.u_speed = share / 2;

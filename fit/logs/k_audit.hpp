@@ -7,6 +7,7 @@
 
 #include "fit/logs/log_audit.hpp"
 #include "fit/logs/log_zero.hpp"
+#include "fit/logs/throttle_law.hpp"
 #include "fit/model/thrust_fit.hpp"
 
 namespace kphi::fit {
@@ -33,7 +34,7 @@ struct OcclusionFit {
 struct JudgedFit {
   std::vector<OcclusionFit> fits;  ///< by occlusion
   std::vector<LogFinding> findings;
-  std::vector<std::string> throttle;  ///< throttle_lines()
+  std::vector<ThrottleLaw> throttle;  ///< throttle_laws()
   double u_speed = 0;  ///< relative standard uncertainty of all speeds together, of their steps; 0: they have none
 };
 /// Throws FitError as fit_thrust does.

@@ -72,6 +72,7 @@ results::StepMean ImportedTable::step(std::size_t index) const {
   step.propeller = propeller;
   step.blades = blades;
   step.diameter_in = diameter_in;
+  step.air_density_kg_m3 = air_density_kg_m3;
   step.occlusion_deg = row.occlusion_deg.value_or(0);
   step.repetition = static_cast<int>(row.repetition.value_or(1));
   step.step = static_cast<int>(index);
@@ -110,8 +111,9 @@ std::vector<Point> some_points(const ImportedTable& imported) {
 }
 
 SpeedSource choose_speed(const StandLog& log, const RowSelection& selection) {
-  const bool electrical_turns =
-      std::ranges::any_of(log.rows, [](const StandRow& row) { return row.electrical_rpm.value_or(0) > 0; });
+  const bool electrical_turns = log.has_electrical && std::ranges::any_of(log.rows, [](const StandRow& row) {
+                                  return row.electrical_rpm.value_or(0) > 0;
+                                });
   const SpeedSource source =
       selection.speed.value_or(electrical_turns || !log.has_optical ? SpeedSource::electrical : SpeedSource::optical);
   if (source == SpeedSource::electrical && !log.has_electrical)

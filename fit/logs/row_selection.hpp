@@ -41,6 +41,7 @@ struct ImportedTable {
   std::string propeller;
   int blades = 0;
   double diameter_in = 0;
+  double air_density_kg_m3 = results::kNotMeasured;
   std::string unit;  ///< of thrust in the file, or what it was computed from
   std::string speed_source;
   std::size_t rows_total = 0;

@@ -12,6 +12,7 @@
 #include "base/error.hpp"
 #include "base/json.hpp"
 #include "base/number.hpp"
+#include "base/statistics.hpp"
 #include "base/text.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/model/identification.hpp"
@@ -178,7 +179,8 @@ ComparedResult load_result(const std::string& path) {
                                  : path +
                                        ": contains neither coefficients.yaml nor steps.csv; run `kphi fit` or name "
                                        "another folder");
-  const compensation::Coefficients coefficients = compensation::load_coefficients(file.string());
+  const compensation::Coefficients coefficients =
+      compensation::load_coefficients(file.string(), compensation::Need::thrust_coefficient);
   results::require_seal(results::read_text(file), file.string());
   return result_of(coefficients, path);
 }
@@ -221,6 +223,67 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   remark_missing(comparison);
   remark_common_factor(comparison);
   return comparison;
+}
+
+SideBySide side_by_side(std::vector<ComparedResult> results, const std::string& remark) {
+  SideBySide table{std::move(results), 0, 0, {}, {}};
+  const bool known = std::ranges::all_of(table.results, [](const ComparedResult& one) { return one.air.has_value(); });
+  if (known)
+    for (ComparedResult& one : table.results) to_standard_air(one);
+  std::vector<double> K_T, p, distances;
+  for (const ComparedResult& one : table.results) K_T.push_back(one.estimates.front().value);
+  table.median = median(K_T);
+  for (const double k : K_T) distances.push_back(std::abs(k - table.median));
+  table.spread = 1.4826 * median(distances) / table.median;
+  for (const ComparedResult& one : table.results) {
+    const ComparedValue& own = one.estimates.front();
+    p.push_back(own.standard_error > 0
+                    ? student_test(Estimate{own.value, own.standard_error, own.freedom}, table.median).p
+                    : 1);
+  }
+  const double level = holm_level(p);
+  for (const double one : p) table.unlike.push_back(one < level);
+  table.remarks.push_back(known ? fmt::format("in standard air, {} kg/m³", kStandardDensity)
+                                : "air density unknown: the weather changes k by up to 3 %");
+  if (!remark.empty()) table.remarks.push_back(remark);
+  return table;
+}
+
+std::string side_by_side_table(const SideBySide& table) {
+  std::string text = fmt::format("K_T in {}\n{:>13} {:>9} {:>9}\n", kUnit, "K_T", "95 %, ±", "/median-1");
+  for (std::size_t i = 0; i < table.results.size(); ++i) {
+    const ComparedResult& one = table.results[i];
+    const ComparedValue& own = one.estimates.front();
+    text += fmt::format("{:>13.5e} {:>9} {:>+7.2f} % {} {}\n", own.value,
+                        own.standard_error > 0
+                            ? fmt::format("{:.1e}", coverage_factor(own.freedom, 1 - kTestLevel) * own.standard_error)
+                            : "?",
+                        100 * (own.value / table.median - 1), table.unlike[i] ? "*" : " ", one.name);
+  }
+  text += fmt::format("\nmedian  {:.5e}; the logs scatter by {:.1f} % (robust standard deviation)\n", table.median,
+                      100 * table.spread);
+  for (const std::string& remark : table.remarks) text += "note  " + remark + "\n";
+  const auto unlike = std::ranges::count(table.unlike, true);
+  return text + (unlike == 0 ? "chance explains every difference from the median\n"
+                             : fmt::format("chance does not explain the {} marked * (5 %, Holm)\n", unlike));
+}
+
+std::string side_by_side_json(const SideBySide& table) {
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < table.results.size(); ++i) {
+    const ComparedResult& one = table.results[i];
+    const ComparedValue& own = one.estimates.front();
+    rows.push_back({{"name", one.name},
+                    {"propeller", one.propeller},
+                    {"K_T", own.value},
+                    {"u", own.standard_error},
+                    {"freedom", own.freedom},
+                    {"share", own.value / table.median - 1},
+                    {"unlike", static_cast<bool>(table.unlike[i])}});
+  }
+  Json json{{"unit", kUnit}, {"logs", rows}};
+  KPHI_JSON_MEMBERS(json, table, median, spread, remarks);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 TruthCheck check_against_truth(const ComparedResult& found, const std::string& truth) {

@@ -69,6 +69,19 @@ struct Comparison {
 /// In standard air if both know their density. Undecided unless a judged quantity has both errors.
 [[nodiscard]] Comparison compare(ComparedResult a, ComparedResult b);
 
+/// K_T of several logs beside each other.
+struct SideBySide {
+  std::vector<ComparedResult> results;  ///< K_T alone; in standard air where the density of each is known
+  double median = 0;                    ///< of K_T, N/(rad/s)²
+  double spread = 0;                    ///< robust standard deviation of K_T, as a share of the median
+  std::vector<bool> unlike;             ///< chance does not explain their difference from the median (5 %, Holm)
+  std::vector<std::string> remarks;
+};
+/// `remark` on their speeds; may be empty.
+[[nodiscard]] SideBySide side_by_side(std::vector<ComparedResult> results, const std::string& remark);
+[[nodiscard]] std::string side_by_side_table(const SideBySide& table);
+[[nodiscard]] std::string side_by_side_json(const SideBySide& table);
+
 /// A result beside the truth of the simulated bench.
 struct TruthCheck {
   std::string text;    ///< "K_T    found …  true …  +0.007 %", one line per number

@@ -198,7 +198,8 @@ std::string standard_section(const Fitted& fitted) {
   if (analysis.standard.empty()) {
     return html_heading(title) +
            "<p class=\"warning\">Air density unknown: k holds for the air of that day only, and k at standard density "
-           "is not given. 10 K or 30 hPa change the density by 3 %. A bench measures it with `ambient:`.</p>\n";
+           "is not given. 10 K or 30 hPa change the density by 3 %. A bench measures it with `ambient:`, "
+           "<code>kphi import</code> takes --air-density-kg-m3.</p>\n";
   }
   HtmlTable table({"φ", "k · 1.225/ρ, N/(rad/s)²", "N/RPM²"});
   for (std::size_t i = 0; i < analysis.standard.size(); ++i) {

@@ -1,11 +1,13 @@
 #include "fit/report/campaign_sections.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "base/number.hpp"
 #include "compensation/units.hpp"
 #include "fit/model/torque_power.hpp"
 #include "fit/report/fit_summary.hpp"
@@ -145,10 +147,29 @@ std::string provenance_section(const Identification& identification, const Prove
   return html + "</dl>\n";
 }
 
+/// Of an imported log.
+std::string throttle_section(const Provenance& provenance) {
+  if (provenance.throttle.empty()) return {};
+  HtmlTable table(
+      {HtmlTable::text("law"), HtmlTable::text("numbers, 95 %"), "residual rms, N", HtmlTable::text("not told from")},
+      true);
+  for (const auto& law : provenance.throttle) {
+    std::string numbers;
+    for (const auto& one : law.numbers)
+      numbers += (numbers.empty() ? "" : ", ") + one.name + " " +
+                 (one.half_95 > 0 ? plain_with_error(one.value, one.half_95) : fmt::format("{:.4g}", one.value));
+    table.row({html_escaped(law.name), html_escaped(numbers), fmt::format("{:.3g}", law.rms_n),
+               html_escaped(fmt::format("{}", fmt::join(law.not_told_from, ", ")))});
+  }
+  return html_section("Thrust over throttle", table,
+                      "The law of each flight stack, as its source computes it; it holds for the supply and the speed "
+                      "controller of this log. ± comes from the scatter of the rows alone. Exports write them.");
+}
+
 }  // namespace
 
 std::string campaign_sections(const Identification& identification, const Provenance& provenance) {
-  return provenance_section(identification, provenance);
+  return throttle_section(provenance) + provenance_section(identification, provenance);
 }
 
 std::string campaign_appendix(const Identification& identification, const Provenance& provenance) {

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "fit/propellers/compare.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {
@@ -34,6 +35,29 @@ std::string family_section(std::span<const Fitted> family) {
   }
   return html_section("The propellers side by side", table,
                       "± is 95 % by the GUM; what each lacks stands in its chapter.");
+}
+
+std::string logs_section(std::span<const Fitted> logs) {
+  std::vector<ComparedResult> results;
+  for (const Fitted& log : logs) results.push_back(result_of_log(log, Origin::unknown, log.identification.propeller));
+  const SideBySide found = side_by_side(std::move(results), "");
+  HtmlTable table({HtmlTable::text("log"), "K<sub>T</sub>, N/(rad/s)²", "from the median, %", "speeds, RPM",
+                   HtmlTable::text("chance explains it")});
+  for (std::size_t i = 0; i < found.results.size(); ++i) {
+    const ComparedResult& one = found.results[i];
+    const ComparedValue& K_T = one.estimates.front();
+    table.row({html_escaped(one.name),
+               with_power_of_ten(K_T.value, coverage_factor(K_T.freedom, 1 - kTestLevel) * K_T.standard_error),
+               fmt::format("{:+.2f}", 100 * (K_T.value / found.median - 1)),
+               html_rpm(one.speed_min_rad_s) + " to " + html_rpm(one.speed_max_rad_s), found.unlike[i] ? "no" : "yes"},
+              found.unlike[i] ? std::optional<std::size_t>(4) : std::nullopt);
+  }
+  return html_section(
+      "The logs side by side", table,
+      fmt::format(
+          "± is 95 %. The logs scatter by {:.1f} % (robust standard deviation); {}. Each is fitted over its own "
+          "speeds; <code>kphi compare</code> takes those that all reached.",
+          100 * found.spread, html_escaped(found.remarks.front())));
 }
 
 std::string slopes_section(std::span<const SharedSlope> slopes) {

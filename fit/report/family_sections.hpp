@@ -12,6 +12,8 @@ namespace kphi::fit {
 /// K_T and the slope of a line, side by side.
 [[nodiscard]] std::string family_section(std::span<const Fitted> family);
 
+/// K_T of logs without occlusions.
+[[nodiscard]] std::string logs_section(std::span<const Fitted> logs);
 /// One slope for each diameter.
 [[nodiscard]] std::string slopes_section(std::span<const SharedSlope> slopes);
 

@@ -391,7 +391,9 @@ Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shar
   if (std::ranges::all_of(identification.table, [](const auto& row) { return row.fit.has_value(); })) {
     wanted.push_back(thrust_figure(identification));
     wanted.push_back(speed_figure(identification));
-    wanted.push_back(repetition_figure(identification));
+    const bool repeated =
+        std::ranges::any_of(identification.table, [](const auto& row) { return row.repetitions > 1; });
+    if (repeated || !identification.alone()) wanted.push_back(repetition_figure(identification));
   }
   if (!power_of(identification.selection.used).empty()) wanted.push_back(power_figure(identification));
   if (settling != nullptr && !settling->thrust_n.empty()) wanted.push_back(settling_figure(*settling));

@@ -230,7 +230,9 @@ std::string caution_text(const Identification& identification, const Analysis& a
   }
   for (const std::string& remark : analysis.remarks) text += fmt::format("remark        {}\n", remark);
   if (!identification.air)
-    text += "air density   unknown: k holds for the air of that day only; a bench measures it with `ambient:`\n";
+    text +=
+        "air density   unknown: k holds for the air of that day only; a bench measures it with `ambient:`, "
+        "`kphi import` takes --air-density-kg-m3\n";
   return text;
 }
 

@@ -186,8 +186,8 @@ std::string format_reports(std::span<const Fitted> family, std::span<const Chapt
   }
   const std::string navigation = "<nav>" + contents + "</nav>\n";
   if (std::ranges::all_of(family, [](const Fitted& one) { return one.identification.alone(); }))
-    return page_head("K_T of " + names, "K_T of several logs, without occlusions", names) + navigation + bodies +
-           kPageEnd;
+    return page_head("K_T of " + names, "K_T of several logs, without occlusions", names) + navigation +
+           logs_section(family) + bodies + kPageEnd;
   if (history != nullptr) {
     const std::string propeller = html_escaped(history->propeller);
     return page_head("k(φ) of " + propeller + " over time", propeller + ": its campaigns over time", names) +

@@ -303,18 +303,33 @@ TEST_F(FitProgram, FitsALogWithoutOcclusionsToKTAlone) {
   const Answer fit = kphi({"fit", folder});
   EXPECT_EQ(fit.code, 0) << fit.err;
   EXPECT_THAT(fit.out, AllOf(HasSubstr("K_T alone, no k(φ) to fly with"), HasSubstr("± is 95 %")));
-  EXPECT_FALSE(std::filesystem::exists(folder + "/coefficients.yaml")) << "nothing to fly with";
+  EXPECT_THAT(results::read_text(folder + "/coefficients.yaml"), AllOf(HasSubstr("form: none"), HasSubstr("no_curve")));
   const std::string page = results::read_text(folder + "/report.html");
   EXPECT_THAT(page, AllOf(HasSubstr("no occlusion was measured"), HasSubstr("Uncertainty budget")));
   ASSERT_EQ(kphi({"report", folder}).code, 0);
   EXPECT_TRUE(results::read_text(folder + "/report.html") == page);
   const json found = json::parse(kphi({"fit", folder, "--no-report", "--json"}).out);
-  EXPECT_TRUE(found.at("coefficients").is_null());
   EXPECT_TRUE(found.at("curve").is_null());
   EXPECT_EQ(found.at("verdict"), "no_curve");
   EXPECT_NEAR(found.at("K_T").get<double>() / fit_thrust(points_of(log)).parameters.k, 1, 1e-4) << "by the slow steps";
-  expect_refused({"fit", folder, "--out", folder + "/c.yaml"}, 2, "no coefficient file can be written");
-  expect_refused({"export", folder, "--to", "px4"}, 2, "not fitted yet");
+  const std::string vehicle = test::source_dir() + "/profiles/foldable_drone.yaml";
+  for (const char* target : {"px4", "gazebo", "agilicious", "ros2", "csv", "mcap"})
+    EXPECT_EQ(kphi({"export", folder, "--to", target, "--out", folder + "/" + target}).code, 0) << target;
+  EXPECT_THAT(results::read_text(folder + "/px4"), HasSubstr("CA_ROTOR0_CT"));
+  EXPECT_THAT(kphi({"export", folder, "--to", "px4"}).err,
+              AllOf(HasSubstr("THR_MDL_FAC 1.0 is right only for motors that hold a commanded speed"),
+                    HasSubstr("no occlusion was measured")));
+  EXPECT_THAT(results::read_text(folder + "/ros2"), Not(HasSubstr("line_slope")));
+  expect_refused({"export", folder, "--to", "c"}, 2, "K_T alone, no k(φ): kphi_curve needs occlusions");
+  for (const char* target : {"c", "px4", "ros2", "ardupilot"})
+    expect_refused({"export", folder, "--to", target, "--vehicle", vehicle}, 2, "K_T alone, no k(φ)");
+  expect_refused({"export", folder, "--to", "ardupilot"}, 2, "name the --vehicle");
+  expect_refused({"export", folder, "--to", "betaflight"}, 2, "no throttle law for betaflight");
+  expect_refused({"export", folder, "--to", "gazebo", "--phi-deg", "45"}, 2, "K_T alone, no k(φ): --phi-deg");
+  expect_refused({"fly", "--coefficients", folder + "/coefficients.yaml", "--vehicle", vehicle}, 2,
+                 "K_T alone, no k(φ): no occlusion was measured");
+  EXPECT_EQ(kphi({"check", folder + "/coefficients.yaml"}).code, 0);
+  EXPECT_EQ(kphi({"compare", folder, folder}).code, 0);
 }
 
 TEST_F(FitProgram, TellsAllItFoundAsJson) {

@@ -49,7 +49,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string text(reinterpret_cast<const char*>(data), size);
   try {
     kphi::results::require_seal(text, "fuzz.yaml");
-    const auto coefficients = kphi::compensation::parse_coefficients(text, "fuzz.yaml");
+    const auto coefficients =
+        kphi::compensation::parse_coefficients(text, "fuzz.yaml", kphi::compensation::Need::thrust_coefficient);
     (void)kphi::compensation::doubts_of(coefficients);
     export_all(coefficients);
   } catch (const kphi::compensation::CoefficientError&) {

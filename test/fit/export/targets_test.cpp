@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -24,8 +27,10 @@ namespace targets_test {
 using test::read_with;
 using test::TemporaryFolder;
 using test::works;
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::string kPython = "/usr/bin/python3";  // Debian's, which sees Debian's modules
 
@@ -169,6 +174,78 @@ TEST(Px4, ParametersAreForceAtFullOutput) {
   EXPECT_EQ(values["THR_MDL_FAC"], 1);
   EXPECT_THAT(result.lost, Contains(HasSubstr("one constant per motor and cannot change it in flight")));
   EXPECT_THROW((void)to_px4(file(), {.speed_max_rpm = 200000}), ConfigurationError) << "above the parameter's range";
+}
+
+/// The coefficients with the laws of a log.
+compensation::Coefficients with_throttle(double factor, double expo, double linear, std::array<double, 4> cubic) {
+  compensation::Coefficients one = file();
+  using Law = compensation::Coefficients::ThrottleLaw;
+  one.throttle = {
+      Law{"px4", 0.05, {{"full_thrust_n", 9, 0.1}, {"THR_MDL_FAC", factor, 0.02}}, {"crazyflie"}},
+      Law{"ardupilot", 0.05, {{"MOT_THST_EXPO", expo, 0.03}, {"MOT_SPIN_MIN", 0.15, 0}, {"MOT_SPIN_MAX", 0.95, 0}}, {}},
+      Law{"ardupilot_voltage",
+          0.02,
+          {{"MOT_THST_EXPO", expo + 0.1, 0.03},
+           {"MOT_SPIN_MIN", 0.15, 0},
+           {"MOT_SPIN_MAX", 0.95, 0},
+           {"MOT_BAT_VOLT_MAX", 16.4, 0}},
+          {}},
+      Law{"betaflight", 0.06, {{"thrust_linear", linear, 3}}, {}},
+      Law{"betaflight_4_2", 0.06, {{"thrust_linear", 1.2 * linear, 3}}, {}},
+      Law{"crazyflie", 0.001, {}, {}}};
+  for (std::size_t i = 0; i < cubic.size(); ++i)
+    one.throttle.back().numbers.push_back({"VMOTOR2THRUST" + std::to_string(i), cubic[i], 1e-4});
+  return one;
+}
+
+TEST(ThrottleOfALog, IsWrittenForEachStackWithItsInterval) {
+  const auto log = with_throttle(0.35, 0.5, 55, {-0.02, 0.06, -0.01, 0.005});
+  const Export px4 = to_px4(log, {});
+  EXPECT_THAT(px4.text, AllOf(HasSubstr("THR_MDL_FAC\t0.35\t9"), HasSubstr("THR_MDL_FAC 0.350 ± 0.020 (95 %"),
+                              HasSubstr("cannot tell this law from that of crazyflie")));
+  EXPECT_THAT(px4.lost, Not(Contains(HasSubstr("right only for motors"))));
+  EXPECT_THAT(to_px4(file(), {}).lost, Contains(HasSubstr("THR_MDL_FAC 1.0 is right only for motors that hold")));
+  const Export too_bent = to_px4(with_throttle(1.2, 1.2, 190, {-0.02, 0.06, -0.01, 0.005}), {});
+  EXPECT_THAT(too_bent.text, HasSubstr("THR_MDL_FAC\t1\t9"));
+  EXPECT_THAT(too_bent.lost, Contains(HasSubstr("PX4 takes 0 to 1")));
+  const Export ardupilot = to_ardupilot(log, {});
+  EXPECT_THAT(ardupilot.text, AllOf(HasSubstr("\nMOT_THST_EXPO,0.6000\n"), HasSubstr("\nMOT_SPIN_MIN,0.15\n"),
+                                    HasSubstr("\nMOT_BAT_VOLT_MAX,16.40\nMOT_OPTIONS,1\n")))
+      << "the law with the voltage describes the rows better";
+  const Export betaflight = to_betaflight(log, {});
+  EXPECT_THAT(betaflight.text,
+              AllOf(HasSubstr("# 2026.6 and later: thrust_linear 55.0 ± 3.0"), HasSubstr("\nset thrust_linear = 55\n"),
+                    HasSubstr("\n# set thrust_linear = 66\n")));
+  EXPECT_THAT(to_betaflight(with_throttle(0, 0, 190, {}), {}).lost, Contains(HasSubstr("Betaflight takes 0 to 150")));
+}
+
+/// As crazyflie-firmware's motors.c solves its cubic.
+double crazyflie_ratio(const std::array<double, 4>& c, double thrust, double volts) {
+  const double p = -c[2] / (3 * c[3]), r = c[1] / (3 * c[3]);
+  const double q = p * p * p + (c[2] * c[1] - 3 * c[3] * (c[0] - thrust)) / (6 * c[3] * c[3]);
+  const double qrp = std::sqrt(q * q + std::pow(r - p * p, 3));
+  return (std::cbrt(q + qrp) + std::cbrt(q - qrp) + p) / volts;
+}
+
+TEST(Crazyflie, SolvesTheCubicForTheThrustThatWasMeasured) {
+  const std::array<double, 4> cubic{-0.02, 0.06, -0.01, 0.005};
+  const std::string text = to_crazyflie(with_throttle(0.35, 0.5, 55, cubic), {}).text;
+  std::array<double, 4> read{};
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    const std::string define = "#define VMOTOR2THRUST" + std::to_string(i) + " ";
+    const std::size_t at = text.find(define);
+    ASSERT_NE(at, std::string::npos) << text;
+    read[i] = std::strtod(text.c_str() + at + define.size(), nullptr);
+  }
+  for (const double volts : {3.2, 3.7, 4.2}) {
+    for (const double u : {0.3, 0.6, 0.9}) {
+      const double v = u * volts, thrust = cubic[0] + v * (cubic[1] + v * (cubic[2] + v * cubic[3]));
+      EXPECT_NEAR(crazyflie_ratio(read, thrust, volts), u, 1e-9);
+    }
+  }
+  EXPECT_THROW((void)to_crazyflie(with_throttle(0, 0, 0, {0, 0.06, 0.05, 0.001}), {}), ConfigurationError)
+      << "turns back: the firmware would find no voltage, or another";
+  EXPECT_THROW((void)to_crazyflie(file(), {}), ConfigurationError) << "no throttle in the log";
 }
 
 TEST(Gazebo, IsReadByXmllint) {
