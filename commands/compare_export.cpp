@@ -148,8 +148,9 @@ ExitCode compare_many(const std::vector<FitInput>& logs, const CompareRequest& r
 }
 
 ComparedResult loaded(const std::optional<FitInput>& log, const std::string& path) {
-  if (!log) return load_result(path);
-  return result_of_log(fitted_log(*log), log->provenance.origin, path);
+  if (log) return result_of_log(fitted_log(*log), log->provenance.origin, path);
+  refuse_other_input(path, InputKind::coefficients);
+  return load_result(path);
 }
 
 ExitCode compare_truth(const CompareRequest& request) {

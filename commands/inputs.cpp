@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -172,7 +173,28 @@ void take_import(const fs::path& file, FitInput& input) {
   }
 }
 
+/// Its first bytes.
+std::string beginning_of(const fs::path& path) {
+  constexpr std::size_t kLooked = 4096;
+  std::string text(kLooked, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(text.data(), kLooked);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return "\n" + text;
+}
+
+/// By the names of its columns neither steps nor k.
+void refuse_a_log(const std::string& text, const fs::path& path) {
+  const std::string_view names = std::string_view(text).substr(0, text.find('\n'));
+  if (names.find("speed_rad_s") != std::string_view::npos || names.find("phi_deg") != std::string_view::npos) return;
+  throw ConfigurationError(
+      fmt::format("{0}: neither steps of kphi nor a table of k (no column speed_rad_s or phi_deg); a log of a stand is "
+                  "imported first: kphi import {0} --out DIR",
+                  path.string()));
+}
+
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
+  refuse_other_input(path.string(), InputKind::other);
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   input.provenance.campaign = path.stem().string();
@@ -181,6 +203,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   if (is_k_table(text)) {
     input.table = averaged_table(read_k_table(text, path.string(), unit_of_k), path);
   } else {
+    refuse_a_log(text, path);
     input.steps = results::parse_steps(text, path.string());
     take_import(input.folder / "import.json", input);
     input.provenance.origin = results::origin_of(input.steps);
@@ -194,6 +217,27 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
 }
 
 }  // namespace
+
+void refuse_other_input(const std::string& path, InputKind wanted) {
+  struct Known {
+    InputKind kind;
+    const char *mark, *name, *next;
+  };
+  static constexpr Known kKnown[] = {
+      {InputKind::run, "\n\x89HDF", "a run file",
+       "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in"},
+      {InputKind::campaign, "\nformat: kphi-campaign/", "a campaign file",
+       "`kphi run` measures it; then name the folder it prints"},
+      {InputKind::bench, "\nformat: kphi-bench/", "a bench file", "`kphi devices --bench` asks its devices"},
+      {InputKind::vehicle, "\nformat: kphi-vehicle/", "a vehicle file", "give it with --vehicle"},
+      {InputKind::coefficients, "\nformat: kphi-coefficients/", "a coefficient file",
+       "`kphi export`, `kphi compare` and `kphi compensate` take it"}};
+  if (!fs::is_regular_file(path)) return;
+  const std::string begin = beginning_of(path);
+  for (const Known& known : kKnown)
+    if (known.kind != wanted && begin.find(known.mark) != std::string::npos)
+      throw ConfigurationError(fmt::format("{}: this is {}; {}", path, known.name, known.next));
+}
 
 FitInput load_input(const std::string& path, const std::string& unit_of_k) {
   const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
@@ -279,6 +323,7 @@ std::vector<std::string> unlike_journal(const compensation::Coefficients& file, 
 }
 
 compensation::Coefficients load_standing_coefficients(const std::string& path, compensation::Need need) {
+  refuse_other_input(path, InputKind::coefficients);
   compensation::Coefficients file = load_sealed_coefficients(path, need);
   const fs::path parent = fs::path(path).parent_path();
   if (!fs::exists(parent / "journal.jsonl")) return file;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -39,6 +40,11 @@ struct FitInput {
 /// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming
 /// the next move, if there are neither steps nor coefficients.
 [[nodiscard]] FitInput load_input(const std::string& path, const std::string& unit_of_k = {});
+
+/// What a file is by its first bytes, where a verb takes another kind.
+enum class InputKind : std::uint8_t { other, run, campaign, bench, vehicle, coefficients };
+/// Throws ConfigurationError, with the command that takes it, if `path` is a file of a known kind and not `wanted`.
+void refuse_other_input(const std::string& path, InputKind wanted);
 
 /// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments, the
 /// load cell's from a weighing of its bench beside it.
