@@ -280,7 +280,10 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
     names.emplace_back(target.name);
     footer += fmt::format("  {:<11} {}\n", target.name, target.what);
   }
-  command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
+  command.add_option("--to", request.to, "target, see below")
+      ->required()
+      ->check(CLI::IsMember(names).description(""))
+      ->type_name("TARGET");
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   add_value(command, "--vehicle", "FILE", request.vehicle,
             "vehicle file, for targets that compute k from arm angles (c, px4, ros2, ardupilot)")
