@@ -14,6 +14,7 @@
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/plausibility.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/logs/import_table.hpp"
 #include "fit/model/averaged_runs.hpp"
@@ -264,9 +265,15 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
   return options;
 }
 
-Fitted fitted_log(const FitInput& input, const SpeedRange& range) {
-  Identification K_T = identify(input.steps, {.speed_range = range, .mounted_once = input.mounted_once});
-  Analysis analysis = analyse(K_T, analysis_options(input, K_T));
+Fitted fitted_log(const FitInput& input, const std::optional<SpeedRange>& range) {
+  IdentificationOptions options{.mounted_once = input.mounted_once};
+  if (input.record) options = input.record->options;
+  options.speed_range = range.value_or(options.speed_range);
+  options.curve = {};
+  Identification K_T = identify(input.steps, options);
+  AnalysisOptions judged = analysis_options(input, K_T);
+  if (input.record && input.record->bench) judged.bench = *input.record->bench;
+  Analysis analysis = analyse(K_T, judged);
   return {std::move(K_T), std::move(analysis)};
 }
 
@@ -340,12 +347,18 @@ compensation::Coefficients load_sealed_coefficients(const std::string& path, com
   return file;
 }
 
-void print_standing(const compensation::Coefficients& file) {
+std::optional<Readiness> print_standing(const compensation::Coefficients& file, const profiles::Vehicle* vehicle) {
   if (origin_named(file.origin) != Origin::measured)
     fmt::print(stderr, "origin        {}: {}\n", file.path, origin_words(file));
-  if (const auto verdict = readiness_named(file.verdict); !verdict || verdict != Readiness::fit_to_fly)
+  auto verdict = readiness_named(file.verdict);
+  if (!verdict || verdict != Readiness::fit_to_fly)
     fmt::print(stderr, "verdict       {}: {}\n", file.path, verdict_words(file));
+  if (const auto there = vehicle != nullptr ? error_in_flight(file, *vehicle) : std::nullopt) {
+    fmt::print(stderr, "in flight     {}: {}\n", file.path, words(*there, *vehicle));
+    verdict = there->readiness;
+  }
   print_doubts(file.path, compensation::doubts_of(file));
+  return verdict;
 }
 
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts) {
@@ -364,9 +377,9 @@ compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vecto
   for (const std::string& path : coefficients) {
     if (curves.contains(path)) continue;
     const compensation::Coefficients file = load_standing_coefficients(path);
-    print_standing(file);
     const auto mismatch = compensation::overlap_mismatch(file.curve.overlap(), path, vehicle.overlap, vehicle.path);
     if (mismatch) throw ConfigurationError(*mismatch);
+    print_standing(file, &vehicle);
     curves.emplace(path, file.curve);
   }
   const auto of = [&](std::size_t rotor) { return curves.at(coefficients[coefficients.size() == 1 ? 0 : rotor]); };

@@ -71,7 +71,10 @@ std::string flagged_text(const std::vector<FlaggedStep>& all) {
 
 // Numbers that are not finite become null: JSON has neither NaN nor infinity.
 
-static void to_json(Json& json, const Estimate& one) { KPHI_JSON_MEMBERS(json, one, value, u, freedom); }
+static void to_json(Json& json, const Estimate& one) {
+  KPHI_JSON_MEMBERS(json, one, value, u, freedom);
+  json["expanded_95"] = expanded(one);
+}
 
 void to_json(Json& json, const HypothesisTest& test) {
   KPHI_JSON_MEMBERS(json, test, name, hypothesis, statistic, value, freedom, error_freedom, p);
@@ -111,7 +114,7 @@ static void to_json(Json& json, const CurvePrediction& one) {
 }
 
 static void to_json(Json& json, const TorqueCoefficient& one) {
-  json = {{"k_q_nm_per_rad2_s2", one.k_q}, {"u_share", one.share_u}};
+  json["k_q_nm_per_rad2_s2"] = one.k_q;
   KPHI_JSON_MEMBERS(json, one, phi_deg, share, drag_per_thrust_m);
 }
 
@@ -250,6 +253,7 @@ std::string headline_text(const Fitted& fitted) {
       text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
                           identification.curve_fit.parameters[i].per);
   if (!analysis.standard.empty()) text += number_line("k_standard", analysis.standard.front());
+  text += torque_line(analysis.torque);
   return text + plus_minus_words(analysis.standard.empty() ? K_T : analysis.standard.front()) + "\n";
 }
 
