@@ -268,6 +268,7 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
 Fitted fitted_log(const FitInput& input, const std::optional<SpeedRange>& range) {
   IdentificationOptions options{.mounted_once = input.mounted_once};
   if (input.record) options = input.record->options;
+  if (range) options.at_speed_rad_s.reset();  // it may lie outside
   options.speed_range = range.value_or(options.speed_range);
   options.curve = {};
   Identification K_T = identify(input.steps, options);

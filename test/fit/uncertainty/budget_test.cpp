@@ -132,7 +132,7 @@ TEST(Budget, NeedsTheSecondOrderOfTheLossOfTheSupplement) {
       sum += loss / kDraws;
       squares += loss * loss / kDraws;
     }
-    EXPECT_NEAR(std::sqrt(squares - sum * sum), published.drawn, 1e-6) << published.x1;
+    EXPECT_NEAR(std::sqrt(squares - sum * sum), published.drawn, 3e-6) << published.x1 << ", of 200,000 draws";
   }
   // The alignment is one such square: u²/2 (√2) of k, and that no more than a tenth of ± by all that is assumed.
   Repeatability once;
@@ -145,35 +145,6 @@ TEST(Budget, NeedsTheSecondOrderOfTheLossOfTheSupplement) {
   ASSERT_NE(alignment, k.rows.end());
   EXPECT_NEAR(alignment->contribution(), std::pow(2 * kPi / 180, 2) / std::numbers::sqrt2, 1e-6);
   EXPECT_LT(k.share(*alignment), 0.1);
-}
-
-// JCGM 101:2008, 9.5, table 11: the gauge block of H.1 with its distributions. Published at 99 %: ± 93 nm by the
-// budget, about ± 98 nm by draws, since few degrees of freedom have tails that no single factor of Student holds.
-TEST(Budget, IsALittleNarrowForTheGaugeBlockOfTheSupplement) {
-  const auto student = [](std::mt19937& random, double u, double freedom) {
-    return u * std::student_t_distribution<double>(freedom)(random);
-  };
-  const auto trapezoid = [](std::mt19937& random, double half, double inexact) {
-    std::uniform_real_distribution<double> unit(0, 1);
-    const double edge = half - inexact + 2 * inexact * unit(random);
-    return -edge + 2 * edge * unit(random);
-  };
-  const auto draw = [&](std::mt19937& random) {
-    std::uniform_real_distribution<double> expansion(9.5e-6, 13.5e-6), turn(0, 2 * kPi);
-    std::normal_distribution<double> room(-0.1, 0.2);
-    const double temperature = room(random) + 0.5 * std::sin(turn(random));
-    return student(random, 25, 18) + student(random, 6, 24) + student(random, 4, 5) + student(random, 7, 8) -
-           50e6 * (trapezoid(random, 1e-6, 0.1e-6) * temperature + expansion(random) * trapezoid(random, 0.05, 0.025));
-  };
-  const double drawn_99 = monte_carlo(draw, 0.99), drawn_95 = monte_carlo(draw);
-  EXPECT_NEAR(drawn_99, 0.5 * (936 - 740), 4);
-  const Budget budget{
-      "length",
-      "nm",
-      838,
-      {row("standard", 25, 18), row("comparator", 9.7, 25.6), row("expansion", 2.9, 50), row("temperature", 16.6, 2)}};
-  EXPECT_NEAR(budget.expanded(0.99) / drawn_99, 0.95, 0.03);
-  EXPECT_NEAR(budget.expanded() / drawn_95, 0.97, 0.05) << "at the level of kphi";
 }
 
 TEST(Budget, SharesAddUpToOneAndLackWhatNobodyKnows) {
