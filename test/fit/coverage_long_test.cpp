@@ -59,52 +59,5 @@ TEST(ThousandCampaigns, CoverOnEightStands) {
   }
 }
 
-// "Fit to fly" says that the thrust is within 3 % at 95 %. A stand whose thrust is further off in at most 5 of 100
-// campaigns deserves no care; one that is further off more often deserves it.
-TEST(ThousandCampaigns, AreWithCareInOneOfTwentyWhereNoneIsDeserved) {
-  constexpr unsigned kCampaigns = 1000;
-  StudyTruth quiet = without_kink(), assumed = without_kink(), twice = without_kink(), bent = without_kink();
-  assumed.between_runs = 0.005;
-  assumed.calibration = std::hypot(0.006, 0.002, 0.0009);
-  assumed.clock = 0.002;
-  twice = assumed;
-  twice.calibration = 0.015;
-  bent = assumed;
-  bent.bend = 0.04;
-  for (const auto& [name, truth] : {std::pair{"quiet", quiet},
-                                    {"assumed sizes", assumed},
-                                    {"calibration 1.5 %", twice},
-                                    {"bend 4 % of K_T", bent}}) {
-    unsigned wrong = 0, care = 0, both = 0, held = 0;
-    double told = 0;
-    std::map<std::string, unsigned> largest;
-    for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
-      const StudyCampaign campaign = study_campaign(truth, 50000 + seed);
-      Identification found = identify(campaign.steps);
-      Analysis analysis = analyse(found, study_options(truth));
-      const Fitted fitted{std::move(found), std::move(analysis)};
-      const double air = campaign.density / kStandardDensity;
-      const double error = true_error(
-          fitted, [&, &truth = truth](double phi, double) { return std::min(truth.k(0), truth.k(phi)) * air; });
-      const FlightReadiness& flight = fitted.analysis.flight;
-      const bool is_wrong = error > flight.limits.fit_to_fly, is_care = flight.readiness() != Readiness::fit_to_fly;
-      wrong += is_wrong ? 1 : 0;
-      care += is_care ? 1 : 0;
-      both += is_wrong && is_care ? 1 : 0;
-      held += error <= flight.error.share ? 1 : 0;
-      told += flight.error.share / kCampaigns;
-      if (is_care)
-        ++largest[flight.doubts.empty() ? flight.error.parts.front().name : flight.doubts.front().text.substr(0, 24)];
-    }
-    fmt::print(
-        "{:<20} {} of {} are more than 3 % wrong, {} with care or less ({} of both); number {:.2f} %, holds in {}\n",
-        name, wrong, kCampaigns, care, both, 100 * told, held);
-    for (const auto& [part, times] : largest) fmt::print("    {} {}\n", times, part);
-    EXPECT_GE(held, 0.936 * kCampaigns) << name;
-    if (wrong <= 0.05 * kCampaigns) EXPECT_LE(care, 0.05 * kCampaigns) << name;
-    if (wrong > 0.2 * kCampaigns) EXPECT_GE(care, 0.9 * kCampaigns) << name;
-  }
-}
-
 }  // namespace coverage_long_test
 }  // namespace kphi::fit
