@@ -73,7 +73,7 @@ TEST(ModbusScanner, GivesUpAStreamThatIsNotModbus) {
   }
 }
 
-/// Of the keypad: wildekek/rdtech-esphome issue 1, rfinnie/rdserialtool issue 5.
+/// As owners report of these supplies: a host that asks locks the keypad, and writing to register 15 does not free it.
 TEST(SupplySlave, OfARidenLocksItsKeypadWhileItIsAskedAndNoWriteFreesIt) {
   SupplySettings settings;
   settings.faults = {{.kind = FaultKind::supply_key, .at = 1s, .count = 1},
