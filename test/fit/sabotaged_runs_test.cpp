@@ -63,6 +63,12 @@ void edit_a_number(const fs::path& file, Dice& dice) {
   write(file, bytes);
 }
 
+/// `from` is in it once.
+void edit(const fs::path& file, const std::string& from, const std::string& to) {
+  std::string text = test::bytes_of(file);
+  write(file, text.replace(text.find(from), from.size(), to));
+}
+
 struct Damage {
   const char* name;
   /// Of the folder; `other` is a campaign of another day.
@@ -110,18 +116,9 @@ const std::vector<Damage>& damages() {
        },
        ""},
       {"another campaign file",
-       [](auto& folder, auto&, Dice&) {
-         std::string text = test::bytes_of(folder / "campaign.yaml");
-         text.replace(text.find("diameter_in: 5"), 14, "diameter_in: 6");
-         write(folder / "campaign.yaml", text);
-       },
+       [](auto& folder, auto&, Dice&) { edit(folder / "campaign.yaml", "diameter_in: 5", "diameter_in: 6"); },
        "campaign.yaml"},
-      {"another bench file",
-       [](auto& folder, auto&, Dice&) {
-         std::string text = test::bytes_of(folder / "bench.yaml");
-         text.replace(text.find("spin: +1"), 8, "spin: -1");
-         write(folder / "bench.yaml", text);
-       },
+      {"another bench file", [](auto& folder, auto&, Dice&) { edit(folder / "bench.yaml", "spin: +1", "spin: -1"); },
        "bench.yaml"},
   };
   return all;
