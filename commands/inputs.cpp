@@ -22,6 +22,7 @@
 #include "fit/uncertainty/readiness.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
+#include "profiles/schema.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/digest.hpp"
@@ -184,6 +185,25 @@ std::string beginning_of(const fs::path& path) {
   return "\n" + text;
 }
 
+/// Of a file that a person writes, given as a result.
+const char* next_move_for(profiles::FileKind kind) {
+  switch (kind) {
+    case profiles::FileKind::campaign:
+      return "`kphi run` measures it; then name the folder that it prints";
+    case profiles::FileKind::bench:
+      return "`kphi devices --bench` asks its devices";
+    case profiles::FileKind::vehicle:
+      return "give it with --vehicle";
+    case profiles::FileKind::answers:
+      return "give it with --answers";
+    case profiles::FileKind::world:
+      return "give it with --world";
+    case profiles::FileKind::layout:
+      return "give it with --layout";
+  }
+  return "";
+}
+
 /// By the names of its columns neither steps nor k.
 void refuse_a_log(const std::string& text, const fs::path& path) {
   const std::string_view names = std::string_view(text).substr(0, text.find('\n'));
@@ -195,7 +215,7 @@ void refuse_a_log(const std::string& text, const fs::path& path) {
 }
 
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
-  refuse_other_input(path.string(), InputKind::other);
+  refuse_other_input(path.string(), InputKind::table);
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   input.provenance.campaign = path.stem().string();
@@ -220,24 +240,18 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
 }  // namespace
 
 void refuse_other_input(const std::string& path, InputKind wanted) {
-  struct Known {
-    InputKind kind;
-    const char *mark, *name, *next;
-  };
-  static constexpr Known kKnown[] = {
-      {InputKind::run, "\n\x89HDF", "a run file",
-       "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in"},
-      {InputKind::campaign, "\nformat: kphi-campaign/", "a campaign file",
-       "`kphi run` measures it; then name the folder it prints"},
-      {InputKind::bench, "\nformat: kphi-bench/", "a bench file", "`kphi devices --bench` asks its devices"},
-      {InputKind::vehicle, "\nformat: kphi-vehicle/", "a vehicle file", "give it with --vehicle"},
-      {InputKind::coefficients, "\nformat: kphi-coefficients/", "a coefficient file",
-       "`kphi export`, `kphi compare` and `kphi compensate` take it"}};
   if (!fs::is_regular_file(path)) return;
   const std::string begin = beginning_of(path);
-  for (const Known& known : kKnown)
-    if (known.kind != wanted && begin.find(known.mark) != std::string::npos)
-      throw ConfigurationError(fmt::format("{}: this is {}; {}", path, known.name, known.next));
+  const auto refuse = [&](const std::string& mark, const std::string& word, const char* next) {
+    if (begin.find("\n" + mark) == std::string::npos) return;
+    throw ConfigurationError(fmt::format("{}: this is a {} file; {}", path, word, next));
+  };
+  for (const profiles::FileKindInfo& kind : profiles::kFileKinds)
+    refuse(fmt::format("format: {}", kind.format), kind.word, next_move_for(kind.kind));
+  if (wanted != InputKind::run)
+    refuse("\x89HDF", "run", "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in");
+  if (wanted != InputKind::coefficients)
+    refuse("format: kphi-coefficients/", "coefficient", "`kphi export`, `kphi compare` and `kphi compensate` take it");
 }
 
 FitInput load_input(const std::string& path, const std::string& unit_of_k) {

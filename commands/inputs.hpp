@@ -42,9 +42,9 @@ struct FitInput {
 /// the next move, if there are neither steps nor coefficients.
 [[nodiscard]] FitInput load_input(const std::string& path, const std::string& unit_of_k = {});
 
-/// What a file is by its first bytes, where a verb takes another kind.
-enum class InputKind : std::uint8_t { other, run, campaign, bench, vehicle, coefficients };
-/// Throws ConfigurationError, with the command that takes it, if `path` is a file of a known kind and not `wanted`.
+/// What a verb takes, of the kinds of files that kphi knows by their first bytes.
+enum class InputKind : std::uint8_t { table, run, coefficients };
+/// Throws ConfigurationError, with the command that takes it, if `path` is a file of another kind that it knows.
 void refuse_other_input(const std::string& path, InputKind wanted);
 
 /// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments, the
