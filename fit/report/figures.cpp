@@ -211,7 +211,7 @@ Figure speed_figure(const Identification& identification) {
                               axis_reach(deviations, 1) / 2) +
                   "set label 2 'k at one speed relative to k of the range, %' at screen 0.018, "
                   "screen 0.5 center rotate by 90\n" +
-                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.12,0.97 spacing 0.02\n", last + 1) +
+                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.16,0.97 spacing 0.02\n", last + 1) +
                   panels + "unset multiplot\n";
   return figure;
 }
