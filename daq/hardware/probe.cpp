@@ -73,6 +73,12 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
              ? "its keypad is locked while kphi asks it, so its output key switches nothing"
              : "its maker's firmware locks the keypad while kphi asks it; this one says that it does not",
          "have another switch for the 12 V within reach"});
+  if (!identity.untold.empty())
+    findings.push_back({Severity::note,
+                        fmt::format("it does not answer {}: whether it limits the current, and why it went off, is not "
+                                    "known; that it went off is seen",
+                                    identity.untold),
+                        ""});
   if (reading.protection != SupplyProtection::none) {
     findings.push_back({Severity::warning, fmt::format("{} protection tripped", name_of(reading.protection)),
                         "find the cause; switching the output on clears it"});

@@ -71,6 +71,10 @@ ScpiSupply::ScpiSupply(std::unique_ptr<Line> line, const Clock& clock) : line_(s
   identity_.off = line_->last_word(kOff, "OUTP?", identity_.device);
   if (identity_.off && !identity_.off->question.empty()) identity_.off->proofs = {"0\n", "0\r", "OFF"};
   forget_errors();
+  over_voltage_tripped_ = known(dialect_->over_voltage_tripped);
+  over_current_tripped_ = known(dialect_->over_current_tripped);
+  regulation_ = known(dialect_->regulation);
+  if (!identity_.untold.empty()) forget_errors();
   identity_.voltage_max_v = ask("VOLT? MAX");
   identity_.current_max_a = ask("CURR? MAX");
   if (identity_.voltage_max_v <= 0 || identity_.current_max_a <= 0)
@@ -108,9 +112,9 @@ SupplyReading ScpiSupply::read(const std::function<void()>& between) {
   between();
   reading.current_limit_a = ask_within("CURR?", identity_.current_max_a);
   between();
-  if (tripped(dialect_->over_voltage_tripped)) reading.protection = SupplyProtection::over_voltage;
+  if (tripped(over_voltage_tripped_)) reading.protection = SupplyProtection::over_voltage;
   between();
-  if (tripped(dialect_->over_current_tripped)) reading.protection = SupplyProtection::over_current;
+  if (tripped(over_current_tripped_)) reading.protection = SupplyProtection::over_current;
   between();
   reading.regulation = regulation();
   return reading;
@@ -174,17 +178,30 @@ double ScpiSupply::ask_within(std::string_view command, double most) {
   fail(command, fmt::format("reading {:g} is impossible: its maximum is {:g}", value, most));
 }
 
+/// The query, or nothing if the instrument has none such: then no answer comes, and its queue has an error -113.
+std::string_view ScpiSupply::known(std::string_view query) {
+  try {
+    (void)line_->query(query);
+    return query;
+  } catch (const DeviceError&) {
+    identity_.untold += (identity_.untold.empty() ? "" : ", ") + std::string(query);
+    return {};
+  }
+}
+
 bool ScpiSupply::tripped(std::string_view command) {
+  if (command.empty()) return false;
   const std::string answer = line_->query(command);
   return answer == "1" || answer == "YES";
 }
 
 SupplyRegulation ScpiSupply::regulation() {
+  if (regulation_.empty()) return SupplyRegulation::unknown;
   if (!dialect_->regulation_by_name) {
-    const auto bits = static_cast<unsigned>(ask_within(dialect_->regulation, 32767 / kMarginOfReading));
+    const auto bits = static_cast<unsigned>(ask_within(regulation_, 32767 / kMarginOfReading));
     return (bits & 2u) != 0 ? SupplyRegulation::constant_current : SupplyRegulation::constant_voltage;
   }
-  const std::string answer = line_->query(dialect_->regulation);
+  const std::string answer = line_->query(regulation_);
   if (answer == "CV") return SupplyRegulation::constant_voltage;
   return answer == "CC" ? SupplyRegulation::constant_current : SupplyRegulation::unknown;
 }

@@ -35,6 +35,7 @@ class ScpiSupply final : public supply::Supply {
   void set(std::string_view command, double value);
   [[nodiscard]] double ask(std::string_view command);
   [[nodiscard]] double ask_within(std::string_view command, double most);
+  [[nodiscard]] std::string_view known(std::string_view query);
   [[nodiscard]] bool tripped(std::string_view command);
   [[nodiscard]] SupplyRegulation regulation();
   [[noreturn]] void fail(std::string_view operation, const std::string& cause, const char* next_move = "");
@@ -43,6 +44,8 @@ class ScpiSupply final : public supply::Supply {
   const Clock& clock_;
   supply::Identity identity_;
   const Dialect* dialect_ = nullptr;
+  /// Queries of the dialect that many instruments lack; empty: this one does.
+  std::string_view over_voltage_tripped_, over_current_tripped_, regulation_;
 };
 
 }  // namespace kphi::scpi

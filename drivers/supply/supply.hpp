@@ -34,6 +34,7 @@ struct Identity {
   double voltage_max_v = 0, current_max_a = 0;  ///< largest settings
   std::optional<LastWord> off{};                ///< switches its output off; nullopt: only this process can
   SupplyKeypad keypad = SupplyKeypad::free;     ///< while it is asked
+  std::string untold{};                         ///< questions that it does not answer, such as why it went off
 };
 
 class PoweredOutput;

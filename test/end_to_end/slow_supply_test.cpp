@@ -100,9 +100,10 @@ class SlowInstrument : public testing::Test {
     type.plain_errors = true;
     return type;
   }
+  explicit SlowInstrument(const sim::ScpiType& type = of_a_plain_maker()) : instrument(type) {}
   SteadyClock clock;
   sim::UsbFaults faults{clock};
-  sim::ScpiInstrument instrument{of_a_plain_maker()};
+  sim::ScpiInstrument instrument;
   sim::ScpiTcp server{instrument, faults};
   RunningBench bench{Manner{1}};
 };
@@ -144,6 +145,27 @@ TEST_F(SlowInstrument, WhoseVoltageWasNotReadIsNotSaidToGiveZeroVolts) {
   EXPECT_THAT(program.err(), testing::HasSubstr("its voltage was not read within 3"));
   EXPECT_THAT(program.err(), testing::Not(testing::HasSubstr("at the terminals")));
   EXPECT_FALSE(instrument.state().output);
+}
+
+/// Many makers have none of the status queries of SCPI-99.
+class InstrumentWithoutStatus : public SlowInstrument {
+ protected:
+  static sim::ScpiType without_status() {
+    sim::ScpiType type;
+    type.tells_status = false;
+    return type;
+  }
+  InstrumentWithoutStatus() : SlowInstrument(without_status()) {}
+};
+
+TEST_F(InstrumentWithoutStatus, CarriesARunAndIsConfirmedOff) {
+  Process program = run();
+  ASSERT_EQ(program.wait(), 0) << program.err();
+  EXPECT_THAT(program.err(), testing::Not(testing::HasSubstr("NOT")));
+  EXPECT_FALSE(instrument.state().output);
+  const results::RunRecording kept = results::read_run(the_run_in(bench.path("results")));
+  ASSERT_GE(kept.supply.size(), 1u);
+  for (const SupplyReading& reading : kept.supply) EXPECT_EQ(reading.regulation, SupplyRegulation::unknown);
 }
 
 }  // namespace kphi::test::slow_supply_test

@@ -143,6 +143,18 @@ TEST_F(ScpiSupplyTest, TakesZeroWithoutACommaForNoError) {
   }
 }
 
+TEST_F(ScpiSupplyTest, IsServedWithoutTheQueriesThatManyMakesLack) {
+  for (const char* query : {"VOLT:PROT:TRIP?", "CURR:PROT:TRIP?", "STAT:QUES:COND?"}) line.answers.erase(query);
+  ScpiSupply supply(lend(line), clock);
+  EXPECT_EQ(supply.identity().untold, "VOLT:PROT:TRIP?, CURR:PROT:TRIP?, STAT:QUES:COND?");
+  supply.apply(kTwelveVolts);
+  const SupplyReading reading = supply.read([] {});
+  EXPECT_EQ(reading.regulation, SupplyRegulation::unknown);
+  EXPECT_EQ(reading.protection, SupplyProtection::none);
+  EXPECT_DOUBLE_EQ(reading.voltage_v, 11.98);
+  supply.switch_off();
+}
+
 TEST_F(ScpiSupplyTest, IsOffWhenItSaysSoWhateverItsErrorsAre) {
   line.answers["SYST:ERR?"] = "-113,\"Undefined header\"";
   ScpiSupply supply(lend(line), clock);

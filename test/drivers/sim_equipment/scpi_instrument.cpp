@@ -226,8 +226,13 @@ std::string ScpiInstrument::obey_unit(std::string_view unit) {
   const std::string_view header = unit.substr(0, blank);
   const std::string_view argument = blank == std::string_view::npos ? "" : trimmed(unit.substr(blank));
   const bool power = matches("MEASure:POWer?", header);
+  const bool status = matches("VOLTage:PROTection:TRIPped?", header) ||
+                      matches("CURRent:PROTection:TRIPped?", header) ||
+                      matches("STATus:QUEStionable:CONDition?", header);
   for (const Row& row : rows()) {
-    if ((row.who & who_is(type_)) == 0 || !matches(row.header, header) || (power && !type_.measures_power)) continue;
+    if ((row.who & who_is(type_)) == 0 || !matches(row.header, header) || (power && !type_.measures_power) ||
+        (status && !type_.tells_status))
+      continue;
     return row.apply({type_, state_, argument});
   }
   note(state_, -113, "Undefined header");

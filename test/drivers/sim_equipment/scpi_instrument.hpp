@@ -22,6 +22,7 @@ struct ScpiType {
   double voltage_max_v = 30, current_max_a = 10;
   bool measures_power = true;
   bool plain_errors = false;  ///< SYST:ERR? answers `0  No Error`, as several makes do
+  bool tells_status = true;   ///< false: of a supply, neither protection nor questionable status can be asked
 };
 
 /// Everything inside, plain.
