@@ -89,7 +89,9 @@ std::string lines_of(const Answers& answers) {
 
 std::string in_words(const Vehicle& vehicle) {
   if (!vehicle.body) return fmt::format("half side {:g} m", vehicle.half_side.value());
-  return fmt::format("{} corners", vehicle.body->outline.size());
+  std::string words = fmt::format("{}", vehicle.body->outline.size());
+  for (const auto& part : vehicle.body->more) words += part ? fmt::format(" and {}", part->size()) : "";
+  return words + " corners";
 }
 
 /// A shape with the occlusion of each rotor.

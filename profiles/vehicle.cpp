@@ -27,17 +27,37 @@ void check_one_body(ProfileReader& file) {
   }
 }
 
-std::optional<compensation::PolygonBody> read_body(ProfileReader& file) {
+/// nullopt, with a finding: not convex.
+std::optional<compensation::ConvexPolygon> read_outline(ProfileReader& file, const std::string& pointer) {
   std::vector<compensation::Position> corners;
-  for (const auto& corner : file.get<std::vector<std::array<double, 2>>>("/body/corners_m")) {
-    corners.push_back({Metres(corner[0]), Metres(corner[1])});
-  }
+  for (const auto& [x, y] : file.get<std::vector<std::array<double, 2>>>(pointer))
+    corners.push_back({Metres(x), Metres(y)});
   const auto outline = compensation::ConvexPolygon::from(corners.data(), corners.size());
-  if (!outline) {
-    file.refuse("/body/corners_m", "not the corners of a convex body in counter-clockwise order",
+  if (!outline)
+    file.refuse(pointer, "not the corners of a convex body in counter-clockwise order",
                 "go round once with the body on the left; leave out corners on the line of their neighbours");
-    return std::nullopt;
+  return outline;
+}
+
+/// Parts that overlap would count twice.
+void read_more_parts(ProfileReader& file, compensation::PolygonBody& body) {
+  if (!file.has("/body/more_corners_m")) return;
+  std::vector<compensation::ConvexPolygon> parts{body.outline};
+  for (std::size_t i = 0; i < file.size("/body/more_corners_m"); ++i) {
+    const std::string pointer = fmt::format("/body/more_corners_m/{}", i);
+    const auto part = read_outline(file, pointer);
+    if (!part) continue;
+    if (std::ranges::any_of(parts, [&](const auto& other) { return compensation::overlap(other, *part); }))
+      file.refuse(pointer, "overlaps another part of the body, and what lies in both would count twice",
+                  "give parts that meet at an edge at most");
+    parts.push_back(*part);
+    body.more[i] = part;
   }
+}
+
+std::optional<compensation::PolygonBody> read_body(ProfileReader& file) {
+  const auto outline = read_outline(file, "/body/corners_m");
+  if (!outline) return std::nullopt;
   compensation::PolygonBody body{*outline,
                                  Rotors<compensation::Hinge>(file.has("/body/hinges") ? file.size("/body/hinges") : 0)};
   for (std::size_t i = 0; i < body.hinges.size(); ++i) {
@@ -46,6 +66,7 @@ std::optional<compensation::PolygonBody> read_body(ProfileReader& file) {
                       from_degrees(file.number(hinge + "/turn_deg")),
                       file.get_or(hinge + "/mirrored", false)};
   }
+  read_more_parts(file, body);
   return body;
 }
 

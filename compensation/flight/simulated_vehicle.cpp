@@ -26,29 +26,29 @@ Eigen::Vector2d lever_of(const Vehicle& vehicle, std::size_t arm, Radians at, co
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) noexcept { return a.x() * b.y() - a.y() * b.x(); }
 
-/// Of the area within an outline: its middle [m], and the means of x², y² and xy about it [m²].
+/// Of the area of all parts of a body: its middle [m], and the means of x², y² and xy about it [m²].
 struct AreaMoments {
   Eigen::Vector2d middle;
   double xx = 0, yy = 0, xy = 0;
 };
 
 /// By Green's theorem: the triangles between the origin and each edge.
-AreaMoments area_moments(const compensation::ConvexPolygon& outline) noexcept {
-  const auto corner = [&](std::size_t i) {
-    const compensation::Position& at = outline.corner(i % outline.size());
-    return Eigen::Vector2d(at.x.value(), at.y.value());
-  };
+AreaMoments area_moments(const compensation::Airframe& airframe) noexcept {
   double area = 0, xx = 0, yy = 0, xy = 0;
   Eigen::Vector2d first = Eigen::Vector2d::Zero();
-  for (std::size_t i = 0; i < outline.size(); ++i) {
-    const Eigen::Vector2d a = corner(i), b = corner(i + 1), sum = a + b;
+  const auto add = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    const Eigen::Vector2d sum = a + b;
     const double triangle = cross(a, b) / 2;
     area += triangle;
     first += triangle / 3 * sum;
     xx += triangle / 6 * (a.x() * sum.x() + b.x() * b.x());
     yy += triangle / 6 * (a.y() * sum.y() + b.y() * b.y());
     xy += triangle / 12 * (a.x() * (a.y() + sum.y()) + b.x() * (b.y() + sum.y()));
-  }
+  };
+  for_each_part(airframe, [&](const compensation::ConvexPolygon& part) {
+    for (std::size_t i = 0; i < part.size(); ++i)
+      add(vector(part.corner(i)), vector(part.corner((i + 1) % part.size())));
+  });
   const Eigen::Vector2d middle = first / area;
   return {middle, xx / area - middle.x() * middle.x(), yy / area - middle.y() * middle.y(),
           xy / area - middle.x() * middle.y()};
@@ -77,7 +77,7 @@ MassProperties mass_properties(const Vehicle& vehicle, const Angles& arms, const
                                const Eigen::Vector2d& plate_offset) noexcept {
   const Build& build = vehicle.build;
   const double plate = build.mass_kg - static_cast<double>(arms.size()) * build.hub_mass_kg;
-  const AreaMoments area = area_moments(outline_of(vehicle.airframe));
+  const AreaMoments area = area_moments(vehicle.airframe);
   const Eigen::Vector2d middle = area.middle + plate_offset;
   MassProperties found;
   found.hubs.resize(arms.size());

@@ -22,7 +22,7 @@ struct Way {
 struct Build {
   double mass_kg = 0;        ///< all of it
   double hub_mass_kg = 0;    ///< motor, propeller and servo of one arm, a point at the hub
-  double body_height_m = 0;  ///< the rest is a plate of the body's outline, this high, unless `body_inertia` is given
+  double body_height_m = 0;  ///< the rest is a plate of the body's parts, this high, unless `body_inertia` is given
   std::optional<Eigen::Vector3d> body_inertia;  ///< kg m² of the body without hubs, about the middle of its outline
   double yaw_arm_m = 0;                         ///< κ: rotor torque per thrust without occlusion
   double rotor_lag_s = 0;                       ///< time constant of a rotor's speed
@@ -44,9 +44,14 @@ struct Vehicle {
   [[nodiscard]] const Angles& angles(Shape shape) const noexcept { return shape == Shape::x ? x : o; }
 };
 
-/// The body seen from above, square or not.
-[[nodiscard]] inline compensation::ConvexPolygon outline_of(const compensation::Airframe& airframe) noexcept {
-  return airframe.polygon ? airframe.polygon->outline : compensation::ConvexPolygon::square(airframe.half_side);
+/// Calls `look` with each part of the body seen from above, square or not.
+template <class Look>
+void for_each_part(const compensation::Airframe& airframe, const Look& look) {
+  look(airframe.polygon ? airframe.polygon->outline : compensation::ConvexPolygon::square(airframe.half_side));
+  if (!airframe.polygon) return;
+  for (const auto& part : airframe.polygon->more) {
+    if (part) look(*part);
+  }
 }
 
 /// In the body frame.

@@ -101,6 +101,13 @@ std::string airframe_in_c(const FlownVehicle& vehicle, const std::string& name) 
     text.set("corner_count", fmt::format("{}", airframe.polygon->outline.size()));
     for (std::size_t i = 0; i < airframe.polygon->outline.size(); ++i)
       at("corners", i, airframe.polygon->outline.corner(i));
+    for (std::size_t more = 0; more < airframe.polygon->more.size(); ++more) {
+      const auto& part = airframe.polygon->more[more];
+      if (!part) continue;
+      text.set(fmt::format("more_corner_counts[{}]", more), fmt::format("{}", part->size()));
+      for (std::size_t i = 0; i < part->size(); ++i)
+        at(fmt::format("more_corners[{}]", more).c_str(), i, part->corner(i));
+    }
   }
   for (std::size_t i = 0; i < rotors; ++i) {
     const bool mirrored = airframe.polygon ? airframe.polygon->hinges[i].mirrored : airframe.mirrored[i];

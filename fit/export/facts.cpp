@@ -277,6 +277,11 @@ std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file
 }
 
 void require_arms(const FlownVehicle& vehicle, const char* target) {
+  const auto& body = vehicle.airframe.polygon;
+  if (body && body->more[0])
+    throw ConfigurationError(
+        fmt::format("--to {}: it knows bodies of one convex part, but {} has more (more_corners_m); export it --to c",
+                    target, vehicle.name));
   if (vehicle.reference_hubs.size() == 0) return;
   throw ConfigurationError(
       fmt::format("--to {}: it computes the hubs from arm angles, but {} gives the hubs themselves (shapes_m); export "

@@ -71,7 +71,8 @@ struct FlownVehicle {
 /// coefficients, or cannot be flown.
 [[nodiscard]] std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file,
                                                         const ExportOptions& options);
-/// Throws ConfigurationError, with the target that can, for a vehicle that tells its hubs.
+/// Throws ConfigurationError, with the target that can, for a vehicle that tells its hubs, or
+/// whose body is of several parts.
 void require_arms(const FlownVehicle& vehicle, const char* target);
 /// Every corner of the body, also of a square one, and every arm's hinge.
 [[nodiscard]] compensation::PolygonBody body_of(const compensation::Airframe& airframe);

@@ -212,6 +212,27 @@ TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
         "17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two…"}});
 }
 
+TEST(Vehicle, MayHaveABodyOfSeveralConvexParts) {
+  const std::string hinges = "  hinges:\n";
+  const auto with = [&](const std::string& parts) {
+    return changed(vehicle_with_body(), hinges, "  more_corners_m: [" + parts + "]\n" + hinges);
+  };
+  const std::string front = "[[0.1, -0.01], [0.15, 0], [0.1, 0.01]]",
+                    back = "[[-0.1, 0.01], [-0.15, 0], [-0.1, -0.01]]";
+  const Vehicle vehicle = parse_vehicle(with(front + ", " + back), "v.yaml");
+  ASSERT_TRUE(vehicle.body->more[0] && vehicle.body->more[1]);
+  EXPECT_EQ(vehicle.body->more[1]->corner(1).x, Metres(-0.15));
+  EXPECT_TRUE(airframe_of(vehicle).polygon->more[0]);
+  const auto refusals_of = [&](const std::string& parts) {
+    return refusals([&] { return parse_vehicle(with(parts), "v.yaml"); });
+  };
+  EXPECT_THAT(refusals_of("[[0.09, -0.01], [0.15, 0], [0.09, 0.01]]"),
+              ElementsAre(StartsWith("5:20: body.more_corners_m[0]: overlaps another part of the body")));
+  EXPECT_THAT(refusals_of(front + ", " + front), ElementsAre(StartsWith("5:60: body.more_corners_m[1]: overlaps")));
+  EXPECT_THAT(refusals_of("[[0.1, 0.01], [0.15, 0], [0.1, -0.01]]"),
+              ElementsAre(StartsWith("5:20: body.more_corners_m[0]: not the corners of a convex body")));
+}
+
 std::vector<std::string> refused_by(const std::string& file, const std::string& from, const std::string& to) {
   return refusals([&] { return parse_vehicle(changed(read_text(shipped(file)), from, to), "v.yaml"); });
 }

@@ -93,6 +93,28 @@ TEST(MassProperties, OfHubsOnTheirWayAreThoseOfTheSameHubsAndMoveAsTheyDo) {
   EXPECT_NE(found.arm_momentum, 0);
 }
 
+/// A hexagon cut in two along y = 0, in whole and by its halves.
+TEST(MassProperties, AndTheShadowOfABodyOfTwoPartsAreThoseOfTheWhole) {
+  const Vehicle whole = star(6, 0.1);
+  Vehicle parts = whole;
+  const auto& outline = whole.airframe.polygon->outline;
+  const compensation::Position upper[] = {outline.corner(0), outline.corner(1), outline.corner(2), outline.corner(3)},
+                               lower[] = {outline.corner(3), outline.corner(4), outline.corner(5), outline.corner(0)};
+  parts.airframe.polygon->outline = *compensation::ConvexPolygon::from(upper, 4);
+  parts.airframe.polygon->more[0] = compensation::ConvexPolygon::from(lower, 4);
+  EXPECT_LT((mass_properties(whole, whole.o).inertia - mass_properties(parts, whole.o).inertia).norm(), 1e-15);
+  EXPECT_LT((mass_properties(whole, whole.o).cog - mass_properties(parts, whole.o).cog).norm(), 1e-15);
+  const Shadow one(whole), two(parts);
+  for (std::size_t arm = 0; arm < 6; ++arm) {
+    EXPECT_GT(one.arc(arm, Radians(3)), 0.5);
+    EXPECT_NEAR(one.arc(arm, Radians(3)), two.arc(arm, Radians(3)), 1e-9);
+    EXPECT_NEAR(one.load(arm, Radians(3)), two.load(arm, Radians(3)), 1e-9);
+  }
+  const FlightResult in_one = fly(kExperiments[kHoverCompensated], clean_scene_of(whole), one);
+  const FlightResult in_two = fly(kExperiments[kHoverCompensated], clean_scene_of(parts), two);
+  EXPECT_LT((in_one.legs[1].mean_error - in_two.legs[1].mean_error).norm(), 1e-6);
+}
+
 TEST(Pilot, OfSixAndEightRotorsCarriesTheWeightWithoutTurning) {
   for (const Vehicle& vehicle : {star(6, 0.1), star(8, 0.12), without_hinges(star(6, 0.1))}) {
     Pilot pilot = *Pilot::build(vehicle, curves_of(vehicle), example_settings());

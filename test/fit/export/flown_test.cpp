@@ -258,6 +258,13 @@ TEST(ExportFlown, OfHubsThatAreToldGoesToCAlone) {
     }
     EXPECT_NO_THROW((void)write(file, {.vehicle = &hexa})) << name;
   }
+  profiles::Vehicle of_parts = hexa;
+  const compensation::Position nose[] = {
+      {Metres(0.2), Metres(-0.02)}, {Metres(0.25), Metres(0)}, {Metres(0.2), Metres(0.02)}};
+  of_parts.body->more[0] = compensation::ConvexPolygon::from(nose, 3);
+  EXPECT_THROW((void)to_px4(file, {.vehicle = &of_parts}), ConfigurationError) << "it knows one part";
+  EXPECT_THAT(to_c(file, {.vehicle = &of_parts}).text,
+              HasSubstr("more_corner_counts[0] = 3;\n  made.more_corners[0][0][0] = (kphi_real)0.2;"));
   EXPECT_THAT(to_px4(file, {.vehicle = &hexa}).text, HasSubstr("CA_ROTOR_COUNT\t6"));
   EXPECT_THAT(to_px4(file, {.vehicle = &hexa}).text, HasSubstr("KPHI_H5_X\t0.05\t"));
 }
