@@ -89,30 +89,56 @@ std::string lines_of(const Answers& answers) {
 
 std::string in_words(const Vehicle& vehicle) {
   if (!vehicle.body) return fmt::format("half side {:g} m", vehicle.half_side.value());
-  return fmt::format("{} corners", vehicle.body->outline.size());
+  std::string words = fmt::format("{}", vehicle.body->outline.size());
+  for (const auto& part : vehicle.body->more) words += part ? fmt::format(" and {}", part->size()) : "";
+  return words + " corners";
 }
 
-/// A shape with the occlusion of each arm.
-std::string lines_of_shape(const std::string& name, const std::array<Radians, 4>& angles,
-                           const compensation::Airframe& airframe) {
+/// A shape with the occlusion of each rotor.
+std::string lines_of_shape(const std::string& name, const Vehicle& vehicle, const compensation::Airframe& airframe) {
+  const bool by_hubs = !vehicle.hubs.empty();
   std::string arms, occlusions;
-  for (std::size_t i = 0; i < angles.size(); ++i) {
-    arms += fmt::format(" {:.6g}", to_degrees(angles[i]));
-    occlusions += fmt::format(" {:.4g}", to_degrees(compensation::occlusion_of_arm(airframe, i, angles[i])));
+  for (std::size_t i = 0; i < rotors_of(vehicle); ++i) {
+    Radians phi;
+    if (by_hubs) {
+      const compensation::HubPosition& hub = vehicle.hubs.at(name)[i];
+      arms += fmt::format(" ({:.6g}, {:.6g})", hub.x.value(), hub.y.value());
+      phi = compensation::occlusion_beside_body(airframe, i, hub);
+    } else {
+      const Radians angle = vehicle.shapes.at(name)[i];
+      arms += fmt::format(" {:.6g}", to_degrees(angle));
+      phi = compensation::occlusion_of_arm(airframe, i, angle);
+    }
+    occlusions += fmt::format(" {:.4g}", to_degrees(phi));
   }
-  return fmt::format("  shape {:<4} arms at{}°, occluded by{}°\n", name, arms, occlusions);
+  return fmt::format("  shape {:<4} {} at{}{}, occluded by{}°\n", name, by_hubs ? "hubs" : "arms", arms,
+                     by_hubs ? " m" : "°", occlusions);
 }
 
 std::string lines_of(const flight::Build& build, const flight::Gains& gains) {
   return fmt::format(
       "  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n"
       "  control    position {:g} 1/s2, velocity {:g} 1/s, attitude {:g} 1/s, rates {:g} 1/s\n",
-      build.mass_kg, build.hub_mass_kg, flight::kGravity * build.mass_kg / 4, fmt::join(gains.position, " "),
-      fmt::join(gains.velocity, " "), fmt::join(gains.attitude, " "), fmt::join(gains.rate, " "));
+      build.mass_kg, build.hub_mass_kg, flight::kGravity * build.mass_kg / static_cast<double>(build.spin.size()),
+      fmt::join(gains.position, " "), fmt::join(gains.velocity, " "), fmt::join(gains.attitude, " "),
+      fmt::join(gains.rate, " "));
+}
+
+/// "; drag torque points up for 1 3, down for 2 4"
+std::string spins_of(const Vehicle& vehicle) {
+  if (!vehicle.dynamics) return "";
+  std::string up, down;
+  for (std::size_t i = 0; i < vehicle.dynamics->spin.size(); ++i)
+    (vehicle.dynamics->spin[i] > 0 ? up : down) += fmt::format(" {}", i + 1);
+  return fmt::format("; drag torque up of{}, down of{}", up, down);
 }
 
 std::string what_flies(const Vehicle& vehicle) {
-  if (vehicle.dynamics && vehicle.control) return lines_of(*vehicle.dynamics, vehicle.control->gains);
+  if (vehicle.dynamics && vehicle.control)
+    return lines_of(*vehicle.dynamics, vehicle.control->gains) +
+           (rotors_of(vehicle) == compensation::kFewestRotors
+                ? "  kphi fly   cannot fly it: three rotors make no yaw of their own\n"
+                : "");
   return fmt::format("  kphi fly   cannot fly it without {}\n", vehicle.dynamics  ? "control"
                                                                 : vehicle.control ? "dynamics"
                                                                                   : "dynamics and control");
@@ -121,12 +147,15 @@ std::string what_flies(const Vehicle& vehicle) {
 std::string lines_of(const Vehicle& vehicle) {
   std::string shapes;
   const compensation::Airframe airframe = airframe_of(vehicle);
-  for (const auto& [name, angles] : vehicle.shapes) shapes += lines_of_shape(name, angles, airframe);
+  for (const std::string& name : shapes_of(vehicle)) shapes += lines_of_shape(name, vehicle, airframe);
   return fmt::format(
-      "  body       {}, arms {:g} m, propeller radius {:g} m\n"
+      "  body       {}, {}, propeller radius {:g} m\n"
+      "  rotors     {}{}\n"
       "  speeds     {:.6g} to {:.6g} RPM\n"
       "  overlap    {}\n{}{}",
-      in_words(vehicle), vehicle.arm_length.value(), vehicle.propeller_radius.value(), to_rpm(vehicle.speed_min),
+      in_words(vehicle),
+      vehicle.hubs.empty() ? fmt::format("arms {:g} m", vehicle.arm_length.value()) : "hubs given for each shape",
+      vehicle.propeller_radius.value(), rotors_of(vehicle), spins_of(vehicle), to_rpm(vehicle.speed_min),
       to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
 }
 
@@ -139,8 +168,7 @@ std::string lines_of(const profiles::World& world) {
       to_newtons_per_rpm2(truth.thrust_coefficient), name_of(truth.law), truth.gamma, truth.mass,
       1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y(), truth.arms.lag_s, to_degrees(Radians(truth.arms.backlash)),
       truth.arms.feedback_delay_s,
-      truth.wiring == flight::Truth().wiring ? ""
-                                             : ", WIRED CROSSWISE: the controller takes one arm's angle for another's");
+      !truth.wired_crosswise() ? "" : ", WIRED CROSSWISE: the controller takes one arm's angle for another's");
 }
 
 /// What the curve's uncertainty does to the speed of a rotor, at the ends of the valid range.

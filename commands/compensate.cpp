@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iostream>
 #include <set>
@@ -23,11 +22,25 @@ namespace {
 using namespace compensation;
 
 constexpr std::size_t kFlushAt = 1 << 16;
-constexpr std::size_t kColumns = 8;
-constexpr std::array<std::string_view, kColumns> kColumnNames = {"theta1_deg", "theta2_deg", "theta3_deg", "theta4_deg",
-                                                                 "thrust1_n",  "thrust2_n",  "thrust3_n",  "thrust4_n"};
-constexpr std::string_view kCsvHeader =
-    "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
+
+/// The columns that are read: of the shape, then of the thrusts.
+std::vector<std::string> columns_in(std::size_t rotors, RowShape shape) {
+  std::vector<std::string> names;
+  for (std::size_t i = 1; i <= rotors; ++i) {
+    if (shape == RowShape::arms) names.push_back(fmt::format("theta{}_deg", i));
+    if (shape == RowShape::hubs) names.insert(names.end(), {fmt::format("hub{}_x_m", i), fmt::format("hub{}_y_m", i)});
+  }
+  for (std::size_t i = 1; i <= rotors; ++i) names.push_back(fmt::format("thrust{}_n", i));
+  return names;
+}
+
+std::string header_out(std::size_t rotors) {
+  std::string header;
+  for (const auto& [before, after] : {std::pair{"phi", "_deg"}, {"k", ""}, {"speed", "_rpm"}}) {
+    for (std::size_t i = 1; i <= rotors; ++i) header += fmt::format("{}{}{},", before, i, after);
+  }
+  return header + "flags\n";
+}
 
 struct FlagName {
   Flag flag;
@@ -56,47 +69,53 @@ Fields fields_of(std::string_view line) {
 
 bool is_blank(const Fields& fields) { return fields == Fields{""}; }
 
-constexpr const char* kNextMove =
-    "; the first line must name theta1_deg..theta4_deg and thrust1_n..thrust4_n once each, separated by commas";
+/// Ends a complaint about the header.
+std::string next_move_for(const std::vector<std::string>& columns) {
+  const auto last_of_shape = columns[std::ranges::find(columns, "thrust1_n") - columns.begin() - 1];
+  return fmt::format("; the first line must name {}..{} and thrust1_n..{} once each, separated by commas",
+                     columns.front(), last_of_shape, columns.back());
+}
 
 /// What is wrong with a column that stands there `found` times; `names` may hold it in another unit.
-std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const Fields& names) {
-  if (found > 1) return fmt::format("column `{}` appears {} times{}", wanted, found, kNextMove);
-  const std::string_view stem = wanted.substr(0, wanted.find('_') + 1);
+std::string complaint_about(std::string_view wanted, std::ptrdiff_t found, const Fields& names,
+                            const std::string& next_move) {
+  if (found > 1) return fmt::format("column `{}` appears {} times{}", wanted, found, next_move);
+  const std::string_view stem = wanted.substr(0, wanted.rfind('_') + 1);
   const auto like = std::ranges::find_if(names, [&](const std::string& name) { return name.starts_with(stem); });
-  if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, kNextMove);
+  if (like == names.end()) return fmt::format("column `{}` is missing{}", wanted, next_move);
   return fmt::format("column `{}` is missing, but there is {}; convert it to the unit in the wanted name and rename it",
                      wanted, in_quotes(*like));
 }
 
 /// The places of the columns.
-std::array<std::size_t, kColumns> read_header(const Fields& names) {
+std::vector<std::size_t> read_header(const Fields& names, const std::vector<std::string>& columns) {
   const auto refuse = [](const std::string& what) { throw ConfigurationError("stdin:1: " + what); };
-  if (is_blank(names)) refuse(fmt::format("no header{}", kNextMove));
-  std::array<std::size_t, kColumns> places{};
-  for (std::size_t i = 0; i < kColumns; ++i) {
-    const auto found = std::ranges::count(names, kColumnNames[i]);
-    if (found != 1) refuse(complaint_about(kColumnNames[i], found, names));
-    places[i] = static_cast<std::size_t>(std::ranges::find(names, kColumnNames[i]) - names.begin());
+  const std::string next_move = next_move_for(columns);
+  if (is_blank(names)) refuse(fmt::format("no header{}", next_move));
+  std::vector<std::size_t> places;
+  for (const std::string& column : columns) {
+    const auto found = std::ranges::count(names, column);
+    if (found != 1) refuse(complaint_about(column, found, names, next_move));
+    places.push_back(static_cast<std::size_t>(std::ranges::find(names, column) - names.begin()));
   }
   return places;
 }
 
 /// Empty when the row can be used, else why not.
-std::string read_row(const Fields& fields, std::size_t expected, const std::array<std::size_t, kColumns>& places,
-                     std::array<double, kColumns>& values) {
+std::string read_row(const Fields& fields, std::size_t expected, const std::vector<std::string>& columns,
+                     const std::vector<std::size_t>& places, std::vector<double>& values) {
   if (fields.empty()) return "has a quote that is not closed";
   if (fields.size() != expected) return fmt::format("has {} fields where the header has {}", fields.size(), expected);
-  for (std::size_t i = 0; i < kColumns; ++i) {
+  for (std::size_t i = 0; i < columns.size(); ++i) {
     const auto value = parse_finite(fields[places[i]]);
-    if (!value) return fmt::format("{} is {}, not a finite number", kColumnNames[i], in_quotes(fields[places[i]]));
+    if (!value) return fmt::format("{} is {}, not a finite number", columns[i], in_quotes(fields[places[i]]));
     values[i] = *value;
   }
   return {};
 }
 
 struct RowStyle {
-  const char* before[4];  ///< the four φ, the four k_i, the four speeds, the flags
+  const char* before[4];  ///< every φ, every k_i, every speed, the flags
   const char* quote;      ///< around a flag
   const char* between;    ///< two flags
   const char* end;
@@ -105,19 +124,19 @@ constexpr RowStyle kCsv{{"", ",", ",", ","}, "", " ", "\n"};
 constexpr RowStyle kJson{{"{\"phi_deg\":[", "],\"k\":[", "],\"speed_rpm\":[", "],\"flags\":["}, "\"", ",", "]}\n"};
 
 void append_row(std::string& text, const RowStyle& style, const Compensator& compensator, const SpeedCommand& command) {
-  const auto four = [&](std::size_t group, const auto& value_of) {
+  const auto each = [&](std::size_t group, const auto& value_of) {
     text += style.before[group];
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < compensator.rotors(); ++i) {
       if (i != 0) text += ',';
       text += shortest(value_of(i));
     }
   };
-  four(0, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
-  four(1, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
-  four(2, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
+  each(0, [&](std::size_t i) { return to_degrees(compensator.occlusion_angles()[i]); });
+  each(1, [&](std::size_t i) { return compensator.scaling_factors()[i]; });
+  each(2, [&](std::size_t i) { return to_rpm(command.speeds[i]); });
   text += style.before[3];
   const char* separator = "";
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < compensator.rotors(); ++i) {
     if (!command.flags[i].any()) continue;
     for (const FlagName& entry : kFlagNames) {
       if (!command.flags[i].has(entry.flag)) continue;
@@ -126,6 +145,17 @@ void append_row(std::string& text, const RowStyle& style, const Compensator& com
     }
   }
   text += style.end;
+}
+
+void set_shape(Compensator& compensator, RowShape shape, const std::vector<double>& values) {
+  const std::size_t rotors = compensator.rotors();
+  Rotors<Radians> angles(rotors);
+  Rotors<HubPosition> hubs(rotors);
+  for (std::size_t i = 0; i < rotors; ++i) {
+    if (shape == RowShape::arms) angles[i] = from_degrees(values[i]);
+    if (shape == RowShape::hubs) hubs[i] = {Metres(values[2 * i]), Metres(values[2 * i + 1])};
+  }
+  shape == RowShape::arms ? compensator.set_arms(angles) : compensator.set_hubs(hubs);
 }
 
 void hand_on(std::string& buffer, std::ostream& out) {
@@ -167,7 +197,11 @@ ExitCode verdict(const RowCounts& counts, const profiles::Vehicle& vehicle) {
     std::cerr << "cannot write to standard output; " << counts.written << " rows were computed\n";
     return ExitCode::failure;
   }
-  if (counts.out_of_reach > 0) {
+  if (counts.out_of_reach > 0 && !vehicle.hubs.empty()) {
+    std::cerr << counts.out_of_reach << " of " << counts.written
+              << " rows have a hub more than 100 m away; there φ stays as it was before, as in flight "
+                 "(arm_angle_beyond)\n";
+  } else if (counts.out_of_reach > 0) {
     std::cerr << counts.out_of_reach << " of " << counts.written << " rows have an arm angle outside "
               << std::round(to_degrees(vehicle.arm_angle_min)) << " to "
               << std::round(to_degrees(vehicle.arm_angle_max)) << "°, the range of the servos of " << vehicle.path
@@ -185,14 +219,17 @@ ExitCode compensate(const CompensateRequest& request) {
   Compensator compensator = compensator_of(request, vehicle);
   if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
   const RowCounts counts = compensate_rows(std::cin, std::cout, std::cerr, compensator,
-                                           request.json ? RowFormat::json_lines : RowFormat::csv);
+                                           request.json ? RowFormat::json_lines : RowFormat::csv,
+                                           vehicle.hubs.empty() ? RowShape::arms : RowShape::hubs);
   return verdict(counts, vehicle);
 }
 
 }  // namespace
 
 RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& words, Compensator& compensator,
-                          RowFormat format) {
+                          RowFormat format, RowShape shape) {
+  const std::size_t rotors = compensator.rotors();
+  const std::vector<std::string> columns = columns_in(rotors, shape);
   std::string line;
   std::uint64_t line_number = 1;
   const auto next = [&] {
@@ -204,27 +241,23 @@ RowCounts compensate_rows(std::istream& in, std::ostream& out, std::ostream& wor
   };
   (void)next();
   const Fields header = fields_of(line);
-  const auto places = read_header(header);
+  const auto places = read_header(header, columns);
 
   RowCounts counts;
-  std::string buffer(format == RowFormat::csv ? kCsvHeader : std::string_view());
-  std::array<double, kColumns> values{};
-  std::array<Radians, 4> arm_angles;
-  std::array<Newtons, 4> thrusts;
+  std::string buffer(format == RowFormat::csv ? header_out(rotors) : "");
+  std::vector<double> values(columns.size());
+  Rotors<Newtons> thrusts(rotors);
   while (out && (++line_number, next())) {
     const Fields fields = fields_of(line);
     if (is_blank(fields)) continue;
-    const std::string complaint = read_row(fields, header.size(), places, values);
+    const std::string complaint = read_row(fields, header.size(), columns, places, values);
     if (!complaint.empty()) {
       ++counts.rejected;
       words << "stdin:" << line_number << ": " << complaint << "; row skipped\n";
       continue;
     }
-    for (std::size_t i = 0; i < 4; ++i) {
-      arm_angles[i] = from_degrees(values[i]);
-      thrusts[i] = Newtons(values[i + 4]);
-    }
-    compensator.set_arms(arm_angles);
+    set_shape(compensator, shape, values);
+    for (std::size_t i = 0; i < rotors; ++i) thrusts[i] = Newtons(values[values.size() - rotors + i]);
     const auto beyond = [](Flags flags) { return flags.has(Flag::arm_angle_beyond); };
     if (std::ranges::any_of(compensator.arm_flags(), beyond)) ++counts.out_of_reach;
     const SpeedCommand command = compensator.speeds_for(thrusts);
@@ -243,7 +276,8 @@ void add_compensate(CLI::App& program, ExitCode& exit_code) {
       "kphi compensate --coefficients coefficients.yaml --vehicle vehicle.yaml < demands.csv", compensate);
   add_notes(
       command,
-      "Columns in: theta1_deg … theta4_deg, thrust1_n … thrust4_n, in any order; others are ignored.\n"
+      "Columns in, for each rotor: theta1_deg …, or hub1_x_m, hub1_y_m … of a vehicle with shapes_m, and thrust1_n …,\n"
+      "in any order; others are ignored.\n"
       "Columns out: phi1_deg …, k1 … (k_i of equation 4), speed1_rpm …, flags (rotor:what, separated by blanks).\n"
       "A row that cannot be used is skipped and reported on stderr; the exit code is then 5.");
   add_flight_files(command, request.coefficients, request.vehicle);

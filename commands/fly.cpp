@@ -57,14 +57,23 @@ flight::Vehicle vehicle_of(const profiles::Vehicle& file, const FlyRequest& requ
   flight::Vehicle vehicle;
   vehicle.airframe = profiles::airframe_of(file);
   vehicle.build = *file.dynamics;
-  for (const auto& [name, angles] : {std::pair{request.open, &vehicle.x}, std::pair{request.folded, &vehicle.o}}) {
-    const auto shape = file.shapes.find(name);
-    if (shape == file.shapes.end()) {
-      throw ConfigurationError(file.path + ": the experiments need the shape " + name +
-                               "; give its angles in shapes_deg");
-    }
-    *angles = shape->second;
+  const std::vector<std::string> names = profiles::shapes_of(file);
+  for (const std::string& name : {request.open, request.folded}) {
+    if (std::ranges::count(names, name) == 0)
+      throw ConfigurationError(
+          fmt::format("{}: the experiments need the shape {}; it has {}: name two of them with --open and --folded, or "
+                      "give {} in {}",
+                      file.path, name, fmt::join(names, ", "), name, file.hubs.empty() ? "shapes_deg" : "shapes_m"));
   }
+  if (file.hubs.empty()) {
+    vehicle.x = file.shapes.at(request.open);
+    vehicle.o = file.shapes.at(request.folded);
+    return vehicle;
+  }
+  const auto from = profiles::hubs_of(file, request.open), to = profiles::hubs_of(file, request.folded);
+  vehicle.x = flight::Angles(from.size(), Radians(0));
+  vehicle.o = flight::Angles(from.size(), Radians(1));
+  for (std::size_t i = 0; i < from.size(); ++i) vehicle.ways.add({from[i], to[i]});
   return vehicle;
 }
 
@@ -74,10 +83,11 @@ AssumedWorld assumed_of(const FlyRequest& request, const flight::Vehicle& vehicl
   return assumed_world(vehicle, {propeller.diameter_in, propeller.blades}, curves);
 }
 
-Truth world_of(const FlyRequest& request, const flight::Vehicle& vehicle,
+Truth world_of(const FlyRequest& request, const profiles::Vehicle& file, const flight::Vehicle& vehicle,
                const compensation::Rotors<compensation::ThrustCurve>& curves) {
   if (request.world.empty()) return assumed_of(request, vehicle, curves).truth;
   const profiles::World world = profiles::load_world(request.world);
+  profiles::require_vehicle(world, file);
   Truth truth = world.truth;
   if (!world.drag) truth.drag = vehicle.build.air_drag_per_s;
   return truth;
@@ -91,13 +101,12 @@ Scene nominal_of(const FlyRequest& request) {
   const flight::Vehicle vehicle = vehicle_of(file, request);
   const auto built = compensation::Compensator::build(curves, vehicle.airframe);
   if (!built.compensator) throw ConfigurationError(request.vehicle + ": " + describe(built.refusal));
-  if (!Pilot::build(vehicle, curves, *file.control)) {
+  if (vehicle.rotors() == compensation::kFewestRotors)
     throw ConfigurationError(request.vehicle +
-                             ": its rotors cannot make every torque in X and in O; check shapes_deg and "
-                             "rotor_spins (two of them 1, two -1, neighbours unlike)");
-  }
-  const Truth world = world_of(request, vehicle, curves);
-  const double hover = kGravity * vehicle.build.mass_kg / 4;
+                             ": three rotors make no yaw of their own, and no tail servo is simulated; kphi fly needs "
+                             "four to eight");
+  const Truth world = world_of(request, file, vehicle, curves);
+  const double hover = kGravity * vehicle.build.mass_kg / static_cast<double>(vehicle.rotors());
   const auto& thrust_max = built.compensator->thrust_max();
   const double weakest = std::min_element(thrust_max.begin(), thrust_max.end())->value();
   if (weakest < 1.5 * hover) {
@@ -156,7 +165,7 @@ Flown fly_requested(const FlyRequest& request) {
   Flown flown{nominal_of(request), {}, {}, {}, {}, {}, {}, {}};
   Scene on_bench = flown.nominal;
   on_bench.truth.gamma = 1;
-  const Shadow shadow(flown.nominal.vehicle.airframe);
+  const Shadow shadow(flown.nominal.vehicle);
   std::array<std::vector<TraceRow>, 9> traces;
   if (!request.out.empty()) make_folder(request.out);
   for (std::size_t i = 0; i < kExperiments.size(); ++i) {
@@ -175,9 +184,10 @@ Flown fly_requested(const FlyRequest& request) {
   return flown;
 }
 
-std::array<double, 4> percent_off(const std::array<double, 4>& shares) {
-  std::array<double, 4> off{};
-  for (std::size_t i = 0; i < off.size(); ++i) off[i] = 100 * (shares[i] - 1);
+/// Of the first so many rotors.
+compensation::Rotors<double> percent_off(const compensation::Rotors<double>& shares, std::size_t rotors) {
+  compensation::Rotors<double> off(rotors);
+  for (std::size_t i = 0; i < rotors; ++i) off[i] = 100 * (shares[i] - 1);
   return off;
 }
 
@@ -204,21 +214,28 @@ std::string circumstances(const FlyRequest& request, const Scene& scene) {
                          i == 0 ? "" : ",\n", curve.thrust_coefficient().value(), share(Radians(0)),
                          share(curve.largest_fitted()), to_degrees(curve.largest_fitted()), request.coefficients[i]);
   }
-  const std::string off = fmt::format(
-      "mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm", 100 * (truth.mass - 1),
-      fmt::join(percent_off(truth.thrust), " "), 1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
+  const std::string off =
+      fmt::format("mass {:+.1f} %, K_T of the rotors {:+.0f} %, centre of gravity {:+.1f} {:+.1f} mm",
+                  100 * (truth.mass - 1), fmt::join(percent_off(truth.thrust, scene.vehicle.rotors()), " "),
+                  1e3 * truth.cog_error.x(), 1e3 * truth.cog_error.y());
   const std::string shapes =
       request.open == "X" && request.folded == "O"
           ? ""
           : fmt::format("\nFlown for X: shape {}; for O: shape {}.", request.open, request.folded);
+  const std::size_t rotors = scene.vehicle.rotors();
+  const std::string unlike = rotors == 4 ? ""
+                                         : fmt::format(
+                                               "\nThe paper's drone has four rotors, this vehicle {}: the "
+                                               "paper's numbers are no measure of it.",
+                                               rotors);
   const std::string wired =
-      truth.wiring == Truth().wiring ? "" : "\nThe controller takes one arm's angle for another's (arm_wiring).";
+      !truth.wired_crosswise() ? "" : "\nThe controller takes one arm's angle for another's (arm_wiring).";
   return fmt::format(
       "The controller flies with {}.\n"
       "The air, which it does not know: K_T {:.4e} N/(rad/s)^2 ({}), loss \"{}\", gamma = {:g} times as on\n"
       "the bench. The vehicle differs from its file by: {}. Seed {}.{}\n\n",
       known, truth.thrust_coefficient.value(), origin_of_k_t(request, scene), name_of(truth.law), truth.gamma, off,
-      request.seed, shapes + wired);
+      request.seed, shapes + unlike + wired);
 }
 
 std::vector<PaperCell> cells_of(const Flown& flown) {

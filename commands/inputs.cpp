@@ -327,8 +327,8 @@ FittedFolder fitted_again(const std::string& folder) {
 }
 
 void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients, std::string& vehicle) {
-  add_value(command, "--coefficients", "FILE[,FILE,FILE,FILE]", coefficients,
-            "coefficients.yaml of `kphi fit`; four, in the order of the rotors, where propellers differ")
+  add_value(command, "--coefficients", "FILE[,FILE…]", coefficients,
+            "coefficients.yaml of `kphi fit`; one for each rotor, in their order, where propellers differ")
       ->delimiter(',')
       ->required();
   add_value(command, "--vehicle", "FILE", vehicle, "vehicle file, such as profiles/foldable_drone.yaml")->required();
@@ -382,12 +382,12 @@ void print_doubts(const std::string& path, const std::vector<std::string>& doubt
 
 compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vector<std::string>& coefficients,
                                                                 const profiles::Vehicle& vehicle) {
-  constexpr std::size_t kRotors = 4;
-  if (coefficients.size() != 1 && coefficients.size() != kRotors)
+  const std::size_t rotors = profiles::rotors_of(vehicle);
+  if (coefficients.size() != 1 && coefficients.size() != rotors)
     throw ConfigurationError(
         fmt::format("--coefficients names {} files, but the vehicle has {} rotors; give one file "
                     "for all of them, or one for each",
-                    coefficients.size(), kRotors));
+                    coefficients.size(), rotors));
   std::map<std::string, compensation::ThrustCurve> curves;
   for (const std::string& path : coefficients) {
     if (curves.contains(path)) continue;
@@ -397,8 +397,9 @@ compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vecto
     print_standing(file, &vehicle);
     curves.emplace(path, file.curve);
   }
-  const auto of = [&](std::size_t rotor) { return curves.at(coefficients[coefficients.size() == 1 ? 0 : rotor]); };
-  return {of(0), of(1), of(2), of(3)};
+  compensation::Rotors<compensation::ThrustCurve> all(rotors, curves.at(coefficients.front()));
+  for (std::size_t i = 1; i < coefficients.size(); ++i) all[i] = curves.at(coefficients[i]);
+  return all;
 }
 
 void add_live_options(CLI::App& command, daq::live::LiveOptions& options) {

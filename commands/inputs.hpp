@@ -84,7 +84,7 @@ std::optional<fit::Readiness> print_standing(const compensation::Coefficients& f
 /// The last of these alone.
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts);
 
-/// The curves of the vehicle's four rotors, from one coefficient file for all or one for each. Throws
+/// The curves of the vehicle's rotors, from one coefficient file for all or one for each. Throws
 /// ConfigurationError for another number of files, or if a file and the vehicle measure φ differently.
 [[nodiscard]] compensation::Rotors<compensation::ThrustCurve> load_curves_for(
     const std::vector<std::string>& coefficients, const profiles::Vehicle& vehicle);

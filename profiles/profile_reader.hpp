@@ -34,6 +34,8 @@ class ProfileReader {
     return find<T>(pointer).value_or(otherwise);
   }
   [[nodiscard]] bool is_text(const std::string& pointer) const { return value(pointer).is_string(); }
+  /// How many items a list has.
+  [[nodiscard]] std::size_t size(const std::string& pointer) const { return value(pointer).size(); }
   /// The keys of an object.
   [[nodiscard]] std::vector<std::string> keys(const std::string& pointer) const;
 
@@ -47,10 +49,11 @@ class ProfileReader {
   /// Refuses keys that nobody has read: a limit that kphi does not know must not look as if it held.
   /// Throws RefusedFile if anything was refused.
   void finish();
+  /// Throws RefusedFile if anything was refused so far.
+  void throw_findings() const;
 
  private:
   [[nodiscard]] const nlohmann::json& value(const std::string& pointer) const;
-  void throw_findings() const;
   SourceDocument document_;
   mutable std::set<std::string> read_{"/format"};  ///< pointers; with what they hold
 };

@@ -13,12 +13,14 @@ Aircraft::Aircraft(const Vehicle& vehicle, const Truth& truth, const Shadow& sha
   vehicle_.build.hub_mass_kg *= truth.mass;
 }
 
-Configuration Aircraft::configuration(const Angles& arms, const std::array<double, 4>& rates) const noexcept {
+Configuration Aircraft::configuration(const Angles& arms, const Rotors<double>& rates) const noexcept {
   const Build& build = vehicle_.build;
   Angles true_arms = arms;
   for (std::size_t i = 0; i < arms.size(); ++i) true_arms[i] = arms[i] + Radians(truth_.arm_error[i]);
-  const double plate = build.mass_kg - 4 * build.hub_mass_kg;
+  const double plate = build.mass_kg - static_cast<double>(arms.size()) * build.hub_mass_kg;
   Configuration found;
+  found.thrust_per_square.resize(arms.size());
+  found.torque_per_square.resize(arms.size());
   found.mass = mass_properties(vehicle_, true_arms, rates, truth_.cog_error * (build.mass_kg / plate));
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const double uncovered = truth_.thrust_coefficient.value() * truth_.thrust[i];
@@ -30,11 +32,11 @@ Configuration Aircraft::configuration(const Angles& arms, const std::array<doubl
 }
 
 AircraftState::Vector Aircraft::slope(const AircraftState::Vector& y, const Configuration& configuration,
-                                      const Eigen::Vector4d& commanded_speeds) const noexcept {
+                                      const RotorSpeeds& commanded_speeds) const noexcept {
   const MassProperties& mass = configuration.mass;
   double thrust = 0;
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < 4; ++i) {
+  for (std::size_t i = 0; i < mass.hubs.size(); ++i) {
     const double speed = y[static_cast<Eigen::Index>(13 + i)];
     const double square = speed * speed, force = configuration.thrust_per_square[i] * square;
     const Eigen::Vector2d lever = mass.hubs[i] - mass.cog;
@@ -54,13 +56,13 @@ AircraftState::Vector Aircraft::slope(const AircraftState::Vector& y, const Conf
   dy[6] = -0.5 * v.dot(rates);
   dy.segment<3>(7) = 0.5 * (w * rates + v.cross(rates));
   dy.segment<3>(10) = torque - rates.cross(momentum);
-  dy.segment<4>(13) = (commanded_speeds - y.segment<4>(13)) / vehicle_.build.rotor_lag_s;
+  dy.segment<kMostRotors>(13) = (commanded_speeds - y.segment<kMostRotors>(13)) / vehicle_.build.rotor_lag_s;
   return dy;
 }
 
 AircraftState Aircraft::step(const AircraftState& state, double width,
                              const std::array<const Configuration*, 3>& stages,
-                             const Eigen::Vector4d& commanded_speeds) const noexcept {
+                             const RotorSpeeds& commanded_speeds) const noexcept {
   AircraftState next;
   next.y = runge_kutta_step(state.y, width, [&](std::size_t stage, const AircraftState::Vector& y) {
     return slope(y, *stages[stage], commanded_speeds);
@@ -82,7 +84,7 @@ AircraftState level_state(const BodyMotion& motion, const MassProperties& mass, 
   state.velocity() = motion.velocity + flat(mass.cog_rate);
   state.y[6] = 1;
   state.momentum().z() = mass.arm_momentum;
-  state.rotors().setConstant(speed);
+  state.rotors().head(static_cast<Eigen::Index>(mass.hubs.size())).setConstant(speed);
   return state;
 }
 

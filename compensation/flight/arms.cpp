@@ -11,7 +11,7 @@ constexpr double kThere = 1e-9;  // rad
 }  // namespace
 
 Arms::Arms(const Angles& at, double morph_s, const ArmHardware& hardware, double step) noexcept
-    : hardware_(hardware), command_(at, morph_s), goal_(at), servos_(at), hubs_(at) {
+    : hardware_(hardware), command_(at, morph_s), goal_(at), servos_(at), hubs_(at), rates_(at.size()) {
   told_.fill(at);
   const double late = std::clamp(hardware.feedback_delay_s, 0.0, kLongestDelay) / step;
   late_ = std::min(static_cast<std::size_t>(std::lround(late)), told_.size() - 1);
@@ -29,7 +29,7 @@ void Arms::advance(double to) noexcept {
     return;
   }
   const Angles middle = command_.angles((now_ + to) / 2), end = command_.angles(to);
-  const std::array<double, 4> rates = command_.rates(to);
+  const Rotors<double> rates = command_.rates(to);
   const double keep = hardware_.lag_s > 0 ? std::exp(-(to - now_) / hardware_.lag_s) : 0.0;
   bool there = !command_.moving(to);
   for (std::size_t i = 0; i < servos_.size(); ++i) {
@@ -45,7 +45,7 @@ void Arms::advance(double to) noexcept {
   now_ = to;
   if (!there) return;
   moving_ = false;
-  rates_ = {};
+  rates_ = Rotors<double>(rates_.size());
 }
 
 Angles Arms::tell() noexcept {

@@ -16,7 +16,7 @@ struct ArmHardware {
 };
 inline constexpr double kLongestDelay = 0.2;  // s
 
-/// Servos, hubs and feedback of all four arms. Allocates nothing.
+/// Servos, hubs and feedback of all arms. Allocates nothing.
 class Arms {
  public:
   /// At rest; from one shape to the next the command takes `morph_s` [s], above 0. `step` [s]: between two calls of
@@ -34,7 +34,7 @@ class Arms {
 
   [[nodiscard]] const Angles& hubs() const noexcept { return hubs_; }
   /// rad/s
-  [[nodiscard]] const std::array<double, 4>& rates() const noexcept { return rates_; }
+  [[nodiscard]] const Rotors<double>& rates() const noexcept { return rates_; }
   [[nodiscard]] const Angles& goal() const noexcept { return goal_; }
 
  private:
@@ -42,7 +42,7 @@ class Arms {
   ArmMotion command_;
   double now_ = 0;
   Angles goal_, servos_, hubs_;
-  std::array<double, 4> rates_{};
+  Rotors<double> rates_;
   bool moving_ = false;
   std::array<Angles, 128> told_{};  ///< a ring
   std::size_t late_ = 0, next_ = 0;

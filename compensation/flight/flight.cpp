@@ -15,6 +15,7 @@ static_assert(kLongestGyroDelay / kStep < 31);
 /// Sums over the part of a leg that counts.
 class LegSums {
  public:
+  explicit LegSums(std::size_t rotors) noexcept : rotors_(static_cast<double>(rotors)) {}
   void add(const Reference& reference, const BodyMotion& estimate, const AircraftState& state) noexcept {
     const Eigen::Vector3d error = reference.position - estimate.position;
     const double distance = error.norm();
@@ -24,7 +25,7 @@ class LegSums {
     sums_.mean_error_rate += reference.velocity - estimate.velocity;
     sums_.mean_distance += distance;
     square_distance_ += distance * distance;
-    sums_.mean_square_speed += rotors.squaredNorm() / 4;
+    sums_.mean_square_speed += rotors.squaredNorm() / rotors_;
     sums_.fastest = std::max(sums_.fastest, rotors.maxCoeff());
   }
   [[nodiscard]] LegResult result() const noexcept {
@@ -38,7 +39,7 @@ class LegSums {
   }
 
  private:
-  double count_ = 0, square_distance_ = 0;
+  double rotors_, count_ = 0, square_distance_ = 0;
   LegResult sums_;  ///< of what it will hold the means
 };
 
@@ -61,18 +62,19 @@ struct Flight {
   AircraftState state_{};
   Reference reference_{};
   BodyMotion estimate_{};
-  Angles told_ = arms_.hubs();                        ///< what the controller was told of the arms
-  Eigen::Vector4d speeds_ = Eigen::Vector4d::Zero();  ///< what it asked for [rad/s]
-  std::array<BodyMotion, 32> estimates_{};            ///< a ring, for the delay
-  std::array<Eigen::Vector3d, 32> rates_{};           ///< a ring, for the delay of the gyro
+  Angles told_ = arms_.hubs();                ///< what the controller was told of the arms
+  RotorSpeeds speeds_ = RotorSpeeds::Zero();  ///< what it asked for [rad/s]
+  std::array<BodyMotion, 32> estimates_{};    ///< a ring, for the delay
+  std::array<Eigen::Vector3d, 32> rates_{};   ///< a ring, for the delay of the gyro
   Random motors_{scene_.seed, kMotorStream};
-  Eigen::Vector4d deviation_ = Eigen::Vector4d::Zero();  ///< of the rotors' speeds, as a share
+  RotorSpeeds deviation_ = RotorSpeeds::Zero();  ///< of the rotors' speeds, as a share
   long step_ = 0;
   std::size_t leg_ = 0;
 
   FlightResult run() {
     const Reference start = reference_at(experiment_.path, 0);
-    const double hover = kGravity * scene_.vehicle.build.mass_kg / 4 / scene_.truth.thrust_coefficient.value();
+    const double hover = kGravity * scene_.vehicle.build.mass_kg / static_cast<double>(rotors()) /
+                         scene_.truth.thrust_coefficient.value();
     state_ = level_state({start.position, start.velocity}, now_.mass, std::sqrt(hover));
     pilot_.set_arms(arms_.hubs());
     FlightResult result;
@@ -87,10 +89,12 @@ struct Flight {
 
   static Pilot pilot_for(const Scene& scene) {
     const auto pilot = Pilot::build(scene.vehicle, scene.curves, scene.pilot);
-    if (!pilot) throw std::invalid_argument("no controller can be built for this vehicle; check its sizes and spins");
+    if (!pilot)
+      throw std::invalid_argument("no controller can be built for this vehicle; check its sizes, shapes and spins");
     return *pilot;
   }
 
+  [[nodiscard]] std::size_t rotors() const noexcept { return scene_.vehicle.rotors(); }
   [[nodiscard]] double seconds() const noexcept { return static_cast<double>(step_) * kStep; }
 
   bool fly_leg(LegResult& result) {
@@ -100,7 +104,7 @@ struct Flight {
     pilot_.compensate(leg.compensated);
     const long begins = step_, ends = begins + std::lround(leg_seconds(experiment_.path) / kStep);
     const long counts_from = begins + std::lround(settle_seconds(experiment_.path) / kStep);
-    LegSums sums;
+    LegSums sums(rotors());
     for (; step_ < ends; ++step_) {
       if (step_ % kStepsPerTick == 0) {
         tick();
@@ -141,16 +145,17 @@ struct Flight {
     return rates_[(step - late) % rates_.size()];
   }
   /// What the motors make of what they are told: a deviation that wanders.
-  [[nodiscard]] Eigen::Vector4d as_driven(const Eigen::Vector4d& told) noexcept {
+  [[nodiscard]] RotorSpeeds as_driven(const RotorSpeeds& told) noexcept {
     if (!(scene_.truth.motor_noise > 0)) return told;
     const double keep = std::exp(-kStep / kMotorNoiseMemory), fresh = std::sqrt(1 - keep * keep);
-    for (double& one : deviation_) one = keep * one + motors_.normal(0, fresh * scene_.truth.motor_noise);
-    return told.cwiseProduct(Eigen::Vector4d::Ones() + deviation_).cwiseMax(0);
+    for (double& one : deviation_.head(static_cast<Eigen::Index>(rotors())))
+      one = keep * one + motors_.normal(0, fresh * scene_.truth.motor_noise);
+    return told.cwiseProduct(RotorSpeeds::Ones() + deviation_).cwiseMax(0);
   }
 
   void advance() noexcept {
     const Angles told = arms_.tell();
-    for (std::size_t i = 0; i < told.size(); ++i) told_[i] = told[static_cast<std::size_t>(scene_.truth.wiring[i])];
+    for (std::size_t i = 0; i < told.size(); ++i) told_[i] = told[scene_.truth.wiring[i]];
     pilot_.set_arms(told_);
     speeds_ = as_driven(pilot_.act(rates_told()));
     if (!arms_.moving()) {
@@ -172,13 +177,17 @@ struct Flight {
     TraceRow found;
     found.time = seconds();
     found.leg = leg_;
+    found.on_ways = scene_.vehicle.ways.size() != 0;
     found.reference = reference_.position;
     found.estimate = estimate_.position;
     found.truth = truth.position;
     found.rotation = roll_pitch_yaw(state_.attitude());
     const Angles& arms = arms_.hubs();
     const auto& compensator = pilot_.compensator();
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (auto* each : {&found.arms, &found.arms_told, &found.occlusions, &found.occlusions_believed, &found.scaling,
+                       &found.thrusts_asked, &found.thrusts, &found.speeds_asked, &found.speeds})
+      each->resize(rotors());
+    for (std::size_t i = 0; i < rotors(); ++i) {
       const auto rotor = static_cast<Eigen::Index>(i);
       found.arms[i] = arms[i].value() + scene_.truth.arm_error[i];
       found.arms_told[i] = told_[i].value();

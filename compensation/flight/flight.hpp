@@ -124,12 +124,13 @@ struct TraceRow {
   std::size_t leg;
   Eigen::Vector3d reference, estimate, truth;  ///< m
   Eigen::Vector3d rotation;                    ///< roll, pitch, yaw [rad]
-  std::array<double, 4> arms, arms_told;       ///< rad: where the hubs are, and what the controller was told
-  std::array<double, 4> occlusions,
-      occlusions_believed;                       ///< rad: φ by the rim arc as it is, and as the controller knows it
-  std::array<double, 4> scaling;                 ///< k_i
-  std::array<double, 4> thrusts_asked, thrusts;  ///< N: of the mixer, and of the rotors
-  std::array<double, 4> speeds_asked, speeds;    ///< rad/s
+  bool on_ways = false;                        ///< arms are no angles but shares of a way, as in Angles
+  Rotors<double> arms, arms_told;              ///< rad, or shares: where the hubs are, and what the controller was told
+  Rotors<double> occlusions,
+      occlusions_believed;                ///< rad: φ by the rim arc as it is, and as the controller knows it
+  Rotors<double> scaling;                 ///< k_i
+  Rotors<double> thrusts_asked, thrusts;  ///< N: of the mixer, and of the rotors
+  Rotors<double> speeds_asked, speeds;    ///< rad/s
 };
 
 /// Throws std::invalid_argument if the pilot cannot be built for the vehicle. Allocates nothing while it flies unless

@@ -11,11 +11,10 @@ using compensation::Mixer;
 using compensation::RotorLayout;
 
 RotorLayout layout_of(const Vehicle& vehicle, const MassProperties& mass) noexcept {
-  RotorLayout layout{compensation::Rotors<compensation::HubPosition>(4), compensation::Rotors<int>(4)};
-  for (std::size_t i = 0; i < 4; ++i) {
+  RotorLayout layout{Rotors<compensation::HubPosition>(vehicle.rotors()), vehicle.build.spin};
+  for (std::size_t i = 0; i < vehicle.rotors(); ++i) {
     const Eigen::Vector2d lever = mass.hubs[i] - mass.cog;
     layout.hubs[i] = {Metres(lever.x()), Metres(lever.y())};
-    layout.spins[i] = vehicle.build.spin[i] > 0 ? 1 : -1;
   }
   return layout;
 }
@@ -83,10 +82,10 @@ std::optional<Pilot> Pilot::build(const Vehicle& vehicle, const compensation::Ro
                                   const PilotSettings& settings) {
   const auto built = Compensator::build(curves, vehicle.airframe);
   const auto mixer =
-      Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x, {})), {Metres(vehicle.build.yaw_arm_m), 0.0});
+      Mixer::build(layout_of(vehicle, mass_properties(vehicle, vehicle.x)), {Metres(vehicle.build.yaw_arm_m), 0.0});
   if (!built.compensator || !mixer) return std::nullopt;
   Mixer in_o = *mixer;
-  if (!in_o.set_layout(layout_of(vehicle, mass_properties(vehicle, vehicle.o, {})))) return std::nullopt;
+  if (!in_o.set_layout(layout_of(vehicle, mass_properties(vehicle, vehicle.o)))) return std::nullopt;
   return Pilot(vehicle, settings, *built.compensator, *mixer);
 }
 
@@ -97,7 +96,7 @@ Pilot::Pilot(const Vehicle& vehicle, const PilotSettings& settings, const Compen
       compensator_(compensator),
       mixer_(mixer),
       rate_control_(settings.gains, vehicle.build.rotor_lag_s),
-      mass_(mass_properties(vehicle, vehicle.x, {})),
+      mass_(mass_properties(vehicle, vehicle.x)),
       arms_(vehicle.x) {}
 
 void Pilot::compensate(bool on) noexcept {
@@ -108,11 +107,18 @@ void Pilot::compensate(bool on) noexcept {
 void Pilot::set_arms(const Angles& arms) noexcept {
   if (arms == arms_) return;
   arms_ = arms;
-  mass_ = mass_properties(vehicle_, arms, {});
+  mass_ = mass_properties(vehicle_, arms);
   Angles as_wired = arms;
-  for (std::size_t i = 0; i < 4; ++i) as_wired[i] = arms[static_cast<std::size_t>(settings_.arm_order[i])];
-  compensator_.set_arms(as_wired);
+  for (std::size_t i = 0; i < settings_.arm_order.size(); ++i) as_wired[i] = arms[settings_.arm_order[i]];
+  tell(as_wired);
   allocate();
+}
+
+void Pilot::tell(const Angles& arms) noexcept {
+  if (vehicle_.ways.size() == 0) return compensator_.set_arms(arms);
+  Rotors<compensation::HubPosition> hubs(arms.size());
+  for (std::size_t i = 0; i < arms.size(); ++i) hubs[i] = hub_of(vehicle_, i, arms[i]);
+  compensator_.set_hubs(hubs);
 }
 
 void Pilot::allocate() noexcept { mixer_.set_layout(layout_of(vehicle_, mass_), compensator_.drag_scale()); }
@@ -125,7 +131,7 @@ void Pilot::look(const Reference& reference, const BodyMotion& estimate, const E
   wanted_rates_ = rates_along(reference.jerk, collective_, wanted);
 }
 
-Eigen::Vector4d Pilot::act(const Eigen::Vector3d& body_rates) noexcept {
+RotorSpeeds Pilot::act(const Eigen::Vector3d& body_rates) noexcept {
   const Eigen::Vector3d torque = rate_control_.torque(wanted_rates_, feedback_rates_, body_rates, mass_.inertia);
   compensation::ThrustLimits limits;
   limits.largest = compensator_.thrust_max();
@@ -136,7 +142,10 @@ Eigen::Vector4d Pilot::act(const Eigen::Vector3d& body_rates) noexcept {
   concessions_ += mixed.concessions.any() ? 1 : 0;
   thrusts_ = mixed.thrusts;
   const auto command = compensator_.speeds_for(mixed.thrusts);
-  return {command.speeds[0].value(), command.speeds[1].value(), command.speeds[2].value(), command.speeds[3].value()};
+  RotorSpeeds speeds = RotorSpeeds::Zero();
+  for (std::size_t i = 0; i < command.speeds.size(); ++i)
+    speeds[static_cast<Eigen::Index>(i)] = command.speeds[i].value();
+  return speeds;
 }
 
 }  // namespace kphi::flight

@@ -78,8 +78,8 @@ inline constexpr int kStepsPerTick = 5;  ///< position and attitude: every 10 ms
 
 struct PilotSettings {
   Gains gains;
-  double assured_yaw = 0;                      ///< N m that the saturation leaves to yaw
-  std::array<int, 4> arm_order{{0, 1, 2, 3}};  ///< which arm's angle the compensation takes for rotor i's; else a fault
+  double assured_yaw = 0;           ///< N m that the saturation leaves to yaw
+  Rotors<std::size_t> arm_order{};  ///< which arm's angle the compensation takes for rotor i's, a fault; none: its own
 };
 
 class Pilot {
@@ -95,7 +95,7 @@ class Pilot {
   /// At 100 Hz.
   void look(const Reference& reference, const BodyMotion& estimate, const Eigen::Quaterniond& attitude) noexcept;
   /// At 500 Hz: rotor speeds [rad/s].
-  [[nodiscard]] Eigen::Vector4d act(const Eigen::Vector3d& body_rates) noexcept;
+  [[nodiscard]] RotorSpeeds act(const Eigen::Vector3d& body_rates) noexcept;
 
   [[nodiscard]] const compensation::Compensator& compensator() const noexcept { return compensator_; }
   [[nodiscard]] const compensation::Rotors<Newtons>& thrusts() const noexcept { return thrusts_; }
@@ -105,6 +105,7 @@ class Pilot {
  private:
   Pilot(const Vehicle& vehicle, const PilotSettings& settings, const compensation::Compensator& compensator,
         const compensation::Mixer& mixer) noexcept;
+  void tell(const Angles& arms) noexcept;
   void allocate() noexcept;
 
   Vehicle vehicle_;

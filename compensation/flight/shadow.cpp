@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 
-#include "compensation/flight/simulated_vehicle.hpp"
-
 namespace kphi::flight {
 namespace {
 
@@ -66,15 +64,19 @@ double covered_load(const ConvexPolygon& outline, double radius, double x, doubl
   return covered;
 }
 
-Shadow::Shadow(const compensation::Airframe& airframe) {
-  const ConvexPolygon outline = outline_of(airframe);
-  const double radius = airframe.propeller_radius.value();
-  for (std::size_t arm = 0; arm < 4; ++arm) {
+Shadow::Shadow(const Vehicle& vehicle) : arc_(vehicle.rotors()), load_(vehicle.rotors()) {
+  const double radius = vehicle.airframe.propeller_radius.value();
+  for (std::size_t arm = 0; arm < vehicle.rotors(); ++arm) {
     for (std::size_t i = 0; i <= kTableSize; ++i) {
       const Radians angle(2 * kPi * static_cast<double>(i) / kTableSize - kPi);
-      const auto hub = hub_in_body(airframe, arm, angle);
-      arc_[arm].push_back(covered_arc(outline, radius, hub.x.value(), hub.y.value()));
-      load_[arm].push_back(covered_load(outline, radius, hub.x.value(), hub.y.value()));
+      const auto hub = hub_of(vehicle, arm, angle);
+      double arc = 0, load = 0;
+      for_each_part(vehicle.airframe, [&](const ConvexPolygon& part) {
+        arc += covered_arc(part, radius, hub.x.value(), hub.y.value());
+        load += covered_load(part, radius, hub.x.value(), hub.y.value());
+      });
+      arc_[arm].push_back(arc);
+      load_[arm].push_back(load);
     }
   }
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "compensation/airframe.hpp"
+#include "compensation/flight/simulated_vehicle.hpp"
 
 namespace kphi::flight {
 
@@ -19,18 +20,17 @@ namespace kphi::flight {
 /// 2π times the share of a T ∝ r² dr loaded disk over the outline.
 [[nodiscard]] double covered_load(const compensation::ConvexPolygon& outline, double radius, double x, double y);
 
-/// Both, of each arm over its angle, from a table of 2048 angles with straight lines between. Read by any number of
-/// threads.
+/// Both, of each arm over its angle or way, from a table of 2048 angles with straight lines between. Read by any number
+/// of threads.
 class Shadow {
  public:
-  explicit Shadow(const compensation::Airframe& airframe);
+  explicit Shadow(const Vehicle& vehicle);
   [[nodiscard]] double arc(std::size_t arm, Radians angle) const noexcept { return at(arc_[arm], angle.value()); }
   [[nodiscard]] double load(std::size_t arm, Radians angle) const noexcept { return at(load_[arm], angle.value()); }
 
  private:
   [[nodiscard]] static double at(const std::vector<double>& table, double angle) noexcept;
-  std::array<std::vector<double>, 4> arc_;
-  std::array<std::vector<double>, 4> load_;
+  Rotors<std::vector<double>> arc_, load_;
 };
 
 /// What an occlusion truly costs in the simulated air. None of these laws is the line that the controller flies with:

@@ -39,11 +39,11 @@ Angles with_margin(const Angles& arms, double factor) {
   return moved;
 }
 
-void draw_truth(Truth& truth, Random& random) {
+void draw_truth(Truth& truth, std::size_t rotors, Random& random) {
   truth.gamma = std::max(0.0, truth.gamma + random.uniform(-0.4, 0.1));
   truth.mass *= random.normal(1.0, 0.015);
-  for (double& factor : truth.thrust) factor *= random.normal(1.0, 0.01);
-  for (double& error : truth.arm_error) error += random.normal(0.0, 0.02);
+  for (std::size_t i = 0; i < rotors; ++i) truth.thrust[i] *= random.normal(1.0, 0.01);
+  for (std::size_t i = 0; i < rotors; ++i) truth.arm_error[i] += random.normal(0.0, 0.02);
   for (Eigen::Index i = 0; i < 2; ++i) truth.cog_error[i] += random.normal(0.0, 1.5e-3);
   truth.drag *= random.uniform(1.0 / 3, 5.0 / 3);
   for (Eigen::Index i = 0; i < 2; ++i) truth.wind[i] += random.normal(0.0, 0.1);
@@ -93,7 +93,7 @@ Scene drawn_scene(const Scene& nominal, std::size_t index) {
   Scene scene = nominal;
   scene.seed = random.bits();
   scene.truth.law = static_cast<LossLaw>(index % kLossLaws);
-  draw_truth(scene.truth, random);
+  draw_truth(scene.truth, scene.vehicle.rotors(), random);
   draw_gains(scene.pilot.gains, random);
   scene.vehicle.o = with_margin(nominal.vehicle.o, random.uniform(0.4, 2.0));
   draw_curves(scene.curves, random);

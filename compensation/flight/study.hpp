@@ -40,10 +40,11 @@ struct AssumedWorld {
                                   std::uint64_t seed);
 
 /// Draw `index` of the seed of `nominal`, whatever was drawn before: the three loss laws in turn, and about the nominal
-/// world γ from 0.4 less to 0.1 more, mass 1.5 %, K_T 1 % per rotor, arm angles 0.02 rad, centre of gravity 1.5 mm per
-/// axis, draught 0.1 m/s per horizontal axis, k(φ) 3 % in its fall and 0.01 K_T in all off; and times those of the
-/// vehicle file: stiffness of the attitude (its gain times that of the rates, each by the root) 0.8 to 2, kpxy 5/6 to
-/// 10/6, drag 1/3 to 5/3, how far arms stop short in O 0.4 to 2 (ranges are uniform, else standard deviations).
+/// world γ from 0.4 less to 0.1 more, mass 1.5 %, K_T 1 % per rotor, arm angles 0.02 rad (hubs: of their way), centre
+/// of gravity 1.5 mm per axis, draught 0.1 m/s per horizontal axis, k(φ) 3 % in its fall and 0.01 K_T in all off; and
+/// times those of the vehicle file: stiffness of the attitude (its gain times that of the rates, each by the root) 0.8
+/// to 2, kpxy 5/6 to 10/6, drag 1/3 to 5/3, how far arms stop short in O 0.4 to 2 (ranges are uniform, else standard
+/// deviations).
 [[nodiscard]] Scene drawn_scene(const Scene& nominal, std::size_t index);
 
 using NineFlights = std::array<FlightResult, kExperiments.size()>;

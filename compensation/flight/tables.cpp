@@ -59,11 +59,16 @@ class Csv {
   std::string text_;
 };
 
-/// prefix1_unit,…,prefix4_unit
-std::string four(const std::string& prefix, const std::string& unit) {
+/// prefix1_unit, prefix2_unit and so on, for each rotor.
+std::string each(std::size_t rotors, const std::string& prefix, const std::string& unit) {
   std::string names;
-  for (int i = 1; i <= 4; ++i) names += "," + prefix + std::to_string(i) + unit;
+  for (std::size_t i = 1; i <= rotors; ++i) names += "," + prefix + std::to_string(i) + unit;
   return names;
+}
+
+/// Angles of arms, or shares of the hubs' ways.
+std::string arms_columns(std::size_t rotors, bool on_ways, const std::string& what) {
+  return each(rotors, on_ways ? "way" : "arm", what + (on_ways ? "" : "_rad"));
 }
 
 std::string leg_name(const Leg& leg) { return leg.shape == Shape::x ? "X" : leg.compensated ? "O c." : "O n.c."; }
@@ -115,12 +120,14 @@ std::string findings_table(const Findings& found) {
 }
 
 std::string trace_csv(const std::vector<TraceRow>& trace) {
+  const std::size_t n = trace.empty() ? 0 : trace.front().arms.size();
+  const bool on_ways = !trace.empty() && trace.front().on_ways;
   Csv csv(
       "time_s,leg,reference_x_m,reference_y_m,reference_z_m,estimate_x_m,estimate_y_m,estimate_z_m,x_m,y_m,z_m,"
       "roll_rad,pitch_rad,yaw_rad" +
-      four("arm", "_rad") + four("arm", "_told_rad") + four("phi", "_rad") + four("phi", "_believed_rad") +
-      four("k_i_", "") + four("thrust", "_asked_n") + four("thrust", "_n") + four("speed", "_asked_rad_s") +
-      four("speed", "_rad_s"));
+      arms_columns(n, on_ways, "") + arms_columns(n, on_ways, "_told") + each(n, "phi", "_rad") +
+      each(n, "phi", "_believed_rad") + each(n, "k_i_", "") + each(n, "thrust", "_asked_n") + each(n, "thrust", "_n") +
+      each(n, "speed", "_asked_rad_s") + each(n, "speed", "_rad_s"));
   for (const TraceRow& row : trace) {
     csv.add(row.time).add(std::to_string(row.leg + 1));
     csv.add_all(row.reference).add_all(row.estimate).add_all(row.truth).add_all(row.rotation);
@@ -133,8 +140,11 @@ std::string trace_csv(const std::vector<TraceRow>& trace) {
 }
 
 std::string draws_csv(const std::vector<Draw>& draws) {
+  const std::size_t n = draws.empty() ? 0 : draws.front().scene.vehicle.rotors();
+  const bool on_ways = !draws.empty() && draws.front().scene.vehicle.ways.size() != 0;
   Csv csv("draw,law,gamma,mass,cog_x_m,cog_y_m,drag_per_s,wind_x_m_s,wind_y_m_s,kp_xy_per_s2,attitude_gain_per_s" +
-          four("thrust", "") + four("arm_error", "_rad") + four("o_arm", "_rad") +
+          each(n, "thrust", "") + each(n, on_ways ? "way_error" : "arm_error", on_ways ? "" : "_rad") +
+          each(n, on_ways ? "o_way" : "o_arm", on_ways ? "" : "_rad") +
           ",k_start,k_mean_slope_per_rad,lost_plain,lost_compensated,hover_z_plain_m,hover_z_compensated_m,"
           "hover_xy_plain_m,hover_xy_compensated_m,forward_x_m,forward_plain_m,forward_compensated_m,"
           "square_speed_ratio");
@@ -147,7 +157,9 @@ std::string draws_csv(const std::vector<Draw>& draws) {
     const Merits merits = merits_of(draws[i].flights);
     csv.add(std::to_string(i)).add(name_of(truth.law)).add(truth.gamma).add(truth.mass);
     csv.add_all(truth.cog_error).add(truth.drag).add_all(Eigen::Vector2d(truth.wind.head<2>()));
-    csv.add(gains.position.x()).add(gains.attitude.x()).add_all(truth.thrust).add_all(truth.arm_error);
+    csv.add(gains.position.x()).add(gains.attitude.x());
+    for (std::size_t rotor = 0; rotor < n; ++rotor) csv.add(truth.thrust[rotor]);
+    for (std::size_t rotor = 0; rotor < n; ++rotor) csv.add(truth.arm_error[rotor]);
     for (const Radians& arm : draws[i].scene.vehicle.o) csv.add(arm.value());
     csv.add(start / k_t).add(rise / curve.largest_fitted().value() / k_t);
     csv.add(merits.lost_plain ? "1" : "0").add(merits.lost_compensated ? "1" : "0");
@@ -168,8 +180,8 @@ std::string comparison_figure(const std::string& title, const Experiment& experi
       const TraceRow& row = trace[i];
       script += aligned(row.time, 2, 0) + " " + aligned(row.reference.z() - row.truth.z(), 5, 0);
       for (const std::size_t rotor : {0u, 2u}) {
-        script += " " + aligned(to_degrees(Radians(row.arms[rotor])), 3, 0) + " " +
-                  aligned(to_degrees(Radians(row.occlusions[rotor])), 3, 0) + " " +
+        script += " " + aligned(row.on_ways ? 100 * row.arms[rotor] : to_degrees(Radians(row.arms[rotor])), 3, 0) +
+                  " " + aligned(to_degrees(Radians(row.occlusions[rotor])), 3, 0) + " " +
                   aligned(to_degrees(Radians(row.occlusions_believed[rotor])), 3, 0) + " " +
                   aligned(to_rpm(RadPerSec(row.speeds[rotor])), 1, 0);
       }
@@ -196,8 +208,10 @@ std::string comparison_figure(const std::string& title, const Experiment& experi
       "notitle, " +
       line("plain", 2, kPlain, "1", "without compensation") + ", " + line("compensated", 2, kHelped, "1", "with") +
       "\n";
-  script += "set ylabel 'arm angle [deg]'\nplot " + line("compensated", 3, "#333333", "1", "arm 1") + ", " +
-            line("compensated", 7, "#333333", "2", "arm 3") + "\n";
+  const bool on_ways = !compensated.empty() && compensated.front().on_ways;
+  script += std::string("set ylabel '") + (on_ways ? "way of the hub [%]" : "arm angle [deg]") + "'\nplot " +
+            line("compensated", 3, "#333333", "1", "arm 1") + ", " + line("compensated", 7, "#333333", "2", "arm 3") +
+            "\n";
   script += "set ylabel 'occlusion [deg]'\nplot " + line("compensated", 4, "#009E73", "1", "rotor 1, true") + ", " +
             line("compensated", 5, "#555555", "3", "believed") + ", " +
             line("compensated", 8, "#56B4E9", "1", "rotor 3, true") + ", " +

@@ -57,8 +57,10 @@ void doubt_help(Judgement& judgement, const Findings& found) {
               "the draws; k(φ) falls too little, check the slope",
               left, plain, 100 * found.hover_z_better));
   }
+  // Where all rotors lose alike nothing pushes sideways, and the ratio is one of two noises.
   const double sideways = merit(found, "hover_xy_ratio").p50;
-  if (sideways > kSidewaysRatio) {
+  const double more = merit(found, "hover_xy_compensated_m").p50 - merit(found, "hover_xy_plain_m").p50;
+  if (sideways > kSidewaysRatio && more > kSidewaysNoise) {
     judgement.doubts.push_back(
         words("pushes the vehicle sideways: in O it hovers %.1f times as far from its place as without compensation; "
               "check which "

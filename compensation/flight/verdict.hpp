@@ -23,6 +23,7 @@ inline constexpr double kHoverInX = 0.05;        ///< m, median, where nothing i
 inline constexpr double kBetterShare = 0.8;      ///< of the draws: hover height nearer with compensation than without
 inline constexpr double kOverCompensated = 0.5;  ///< of the height error without, beyond the reference
 inline constexpr double kSidewaysRatio = 1.15;   ///< horizontal error with compensation over without, median
+inline constexpr double kSidewaysNoise = 0.02;  ///< m, more of it than without: less than this is the estimator's noise
 
 /// Of many draws, or of one.
 [[nodiscard]] Judgement judgement_of(const Findings& findings);

@@ -14,10 +14,30 @@
 namespace kphi::fit {
 namespace {
 
-/// Widest φ of any arm within the reach of its servo, deg.
+/// Of hubs that are told by themselves: on the straight ways between all shapes, deg.
+double widest_between_shapes(const profiles::Vehicle& vehicle, const compensation::Airframe& airframe) {
+  constexpr int kPieces = 200;
+  double widest = 0;
+  for (const auto& [name, from] : vehicle.hubs) {
+    for (const auto& [other, to] : vehicle.hubs) {
+      for (std::size_t i = 0; i < from.size(); ++i) {
+        for (int piece = 0; piece <= kPieces; ++piece) {
+          const double share = 1.0 * piece / kPieces;
+          const compensation::HubPosition hub{from[i].x + share * (to[i].x - from[i].x),
+                                              from[i].y + share * (to[i].y - from[i].y)};
+          widest = std::max(widest, to_degrees(compensation::occlusion_beside_body(airframe, i, hub)));
+        }
+      }
+    }
+  }
+  return widest;
+}
+
+/// Widest φ of any rotor within the reach of its servo, deg.
 double widest_occlusion(const profiles::Vehicle& vehicle) {
   constexpr int kPieces = 720;
   const compensation::Airframe airframe = profiles::airframe_of(vehicle);
+  if (!vehicle.hubs.empty()) return widest_between_shapes(vehicle, airframe);
   const Radians from = vehicle.arm_angle_min, width = vehicle.arm_angle_max - vehicle.arm_angle_min;
   double widest = 0;
   for (std::size_t arm = 0; arm < compensation::rotors_of(airframe); ++arm)

@@ -86,6 +86,7 @@ Export to_ardupilot(const compensation::Coefficients& file, const ExportOptions&
         "--to ardupilot: the script computes k from arm angles; name the --vehicle; MOT_THST_EXPO alone needs a log "
         "with throttle");
   if (!vehicle) return expo_of(file);
+  require_arms(*vehicle, "ardupilot");
   if (file.curve.overlap() != compensation::OverlapMeasure::rim_arc)
     throw ConfigurationError(
         fmt::format("{}: the script knows the rim_arc alone, these coefficients are flown with the {}", file.path,

@@ -101,6 +101,13 @@ std::string airframe_in_c(const FlownVehicle& vehicle, const std::string& name) 
     text.set("corner_count", fmt::format("{}", airframe.polygon->outline.size()));
     for (std::size_t i = 0; i < airframe.polygon->outline.size(); ++i)
       at("corners", i, airframe.polygon->outline.corner(i));
+    for (std::size_t more = 0; more < airframe.polygon->more.size(); ++more) {
+      const auto& part = airframe.polygon->more[more];
+      if (!part) continue;
+      text.set(fmt::format("more_corner_counts[{}]", more), fmt::format("{}", part->size()));
+      for (std::size_t i = 0; i < part->size(); ++i)
+        at(fmt::format("more_corners[{}]", more).c_str(), i, part->corner(i));
+    }
   }
   for (std::size_t i = 0; i < rotors; ++i) {
     const bool mirrored = airframe.polygon ? airframe.polygon->hinges[i].mirrored : airframe.mirrored[i];
@@ -120,18 +127,22 @@ std::string vehicle_in_c(const FlownVehicle& vehicle, const std::string& name) {
   masses.real_field("body_at[1]", vehicle.masses.body_at.y.value());
   std::vector<int> spins(vehicle.spins.begin(), vehicle.spins.end());
   std::vector<std::string> angles;
-  for (std::size_t i = 0; i < vehicle.reference.size(); ++i) {
+  for (std::size_t i = 0; i < spins.size(); ++i)
     masses.real_field(fmt::format("at_hubs[{}]", i), vehicle.masses.at_hubs[i]);
-    angles.push_back(real(vehicle.reference[i].value()));
-  }
+  for (const Radians angle : vehicle.reference) angles.push_back(real(angle.value()));
+  for (const compensation::HubPosition& hub : vehicle.reference_hubs)
+    angles.push_back(fmt::format("{{{}, {}}}", real(hub.x.value()), real(hub.y.value())));
+  const bool by_hubs = vehicle.reference_hubs.size() != 0;
   return airframe_in_c(vehicle, name) + std::move(masses).text() +
          fmt::format(
              "\n#define {0}_ROTORS {1}\nstatic const int {0}_SPINS[{1}] = {{{2}}}; /* +1: its drag torque points up "
              "*/\n"
              "#define {0}_DRAG_PER_NEWTON {3} /* m, without occlusion */\n"
-             "static const kphi_real {0}_REFERENCE_RAD[{1}] = {{{4}}}; /* arm angles of {5} */\n",
+             "static const kphi_real {0}_REFERENCE_{6} = {{{4}}}; /* {7} of {5} */\n",
              name, spins.size(), fmt::join(spins, ", "), real(vehicle.drag_per_newton), fmt::join(angles, ", "),
-             comment_safe(one_line(vehicle.reference_name)));
+             comment_safe(one_line(vehicle.reference_name)),
+             by_hubs ? fmt::format("M[{}][2]", spins.size()) : fmt::format("RAD[{}]", spins.size()),
+             by_hubs ? "hubs, for kphi_set_hubs," : "arm angles");
 }
 
 }  // namespace

@@ -231,7 +231,7 @@ namespace {
 compensation::Position middle_of(const compensation::Airframe& airframe) {
   flight::Vehicle body{airframe, {}, {}, {}};
   body.build.mass_kg = 1;
-  const Eigen::Vector2d middle = flight::mass_properties(body, {}, {}).cog;
+  const Eigen::Vector2d middle = flight::mass_properties(body, {}).cog;
   return {Metres(middle.x()), Metres(middle.y())};
 }
 
@@ -244,7 +244,7 @@ std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file
   if (const auto mismatch =
           compensation::overlap_mismatch(file.curve.overlap(), file.path, vehicle.overlap, vehicle.path))
     throw ConfigurationError(*mismatch);
-  if (!vehicle.dynamics || vehicle.shapes.empty())
+  if (!vehicle.dynamics)
     throw ConfigurationError(
         fmt::format("{}: no section dynamics, whose masses, spins and torque per thrust the target needs; copy it from "
                     "profiles/foldable_drone.yaml",
@@ -258,15 +258,15 @@ std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file
   flown.masses.body = build.mass_kg - static_cast<double>(rotors) * build.hub_mass_kg;
   flown.masses.body_at = middle_of(flown.airframe);
   flown.masses.at_hubs = compensation::Rotors<double>(rotors, build.hub_mass_kg);
-  flown.spins = compensation::Rotors<int>(rotors);
-  for (std::size_t i = 0; i < rotors; ++i) flown.spins[i] = build.spin[i] > 0 ? 1 : -1;
+  flown.spins = build.spin;
   const auto measured = torque_per_thrust(file, 0);
   flown.drag_per_newton = measured ? measured->value : build.yaw_arm_m;
-  const auto x = vehicle.shapes.find("X");
-  const auto& [name, angles] = x != vehicle.shapes.end() ? *x : *vehicle.shapes.begin();
-  flown.reference_name = name;
-  flown.reference = angles;
-  flown.reference_layout = layout_of(flown.airframe, flown.masses, flown.reference, flown.spins);
+  const std::vector<std::string> shapes = profiles::shapes_of(vehicle);
+  flown.reference_name = std::ranges::count(shapes, "X") > 0 ? "X" : shapes.front();
+  const auto hubs = profiles::hubs_of(vehicle, flown.reference_name);
+  if (vehicle.hubs.empty()) flown.reference = vehicle.shapes.at(flown.reference_name);
+  if (!vehicle.hubs.empty()) flown.reference_hubs = hubs;
+  flown.reference_layout = layout_of(hubs, flown.masses, flown.spins);
   const auto built = compensation::Compensator::build(
       compensation::Rotors<compensation::ThrustCurve>(rotors, file.curve), flown.airframe);
   if (!built.compensator) throw ConfigurationError(vehicle.path + ": " + describe(built.refusal));
@@ -274,6 +274,20 @@ std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file
     throw ConfigurationError(fmt::format("{}: its rotors cannot make every torque in {}; check rotor_spins",
                                          vehicle.path, flown.reference_name));
   return flown;
+}
+
+void require_arms(const FlownVehicle& vehicle, const char* target) {
+  const auto& body = vehicle.airframe.polygon;
+  if (body && body->more[0])
+    throw ConfigurationError(
+        fmt::format("--to {}: it knows bodies of one convex part, but {} has more (more_corners_m); export it --to c",
+                    target, vehicle.name));
+  if (vehicle.reference_hubs.size() == 0) return;
+  throw ConfigurationError(
+      fmt::format("--to {}: it computes the hubs from arm angles, but {} gives the hubs themselves (shapes_m); export "
+                  "it --to c, and "
+                  "tell kphi_set_hubs where they are",
+                  target, vehicle.name));
 }
 
 std::string origin_words(const compensation::Coefficients& file) {

@@ -61,15 +61,19 @@ struct FlownVehicle {
   compensation::Airframe airframe;
   compensation::Masses masses;
   compensation::Rotors<int> spins;
-  double drag_per_newton = 0;                  ///< m, without occlusion: measured, else the vehicle file's
-  std::string reference_name;                  ///< "X", or the file's first shape
-  compensation::Rotors<Radians> reference;     ///< its arm angles
-  compensation::RotorLayout reference_layout;  ///< hubs about its centre of gravity
+  double drag_per_newton = 0;               ///< m, without occlusion: measured, else the vehicle file's
+  std::string reference_name;               ///< "X", or the file's first shape
+  compensation::Rotors<Radians> reference;  ///< its arm angles
+  compensation::Rotors<compensation::HubPosition> reference_hubs;  ///< instead, of a vehicle without hinged arms
+  compensation::RotorLayout reference_layout;                      ///< hubs about its centre of gravity
 };
 /// nullopt without options.vehicle. Throws ConfigurationError if it has no dynamics, measures φ otherwise than the
 /// coefficients, or cannot be flown.
 [[nodiscard]] std::optional<FlownVehicle> flown_vehicle(const compensation::Coefficients& file,
                                                         const ExportOptions& options);
+/// Throws ConfigurationError, with the target that can, for a vehicle that tells its hubs, or
+/// whose body is of several parts.
+void require_arms(const FlownVehicle& vehicle, const char* target);
 /// Every corner of the body, also of a square one, and every arm's hinge.
 [[nodiscard]] compensation::PolygonBody body_of(const compensation::Airframe& airframe);
 

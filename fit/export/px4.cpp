@@ -146,6 +146,7 @@ Export to_px4(const compensation::Coefficients& file, const ExportOptions& optio
   }
   require_turns(options);
   const auto vehicle = flown_vehicle(file, options);
+  if (vehicle) require_arms(*vehicle, "px4");
   if (vehicle && options.phi_deg != 0)
     throw ConfigurationError(
         "--phi-deg with --vehicle: the morphing child takes CT without occlusion; leave one of the two out");

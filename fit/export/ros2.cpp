@@ -150,7 +150,10 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions& opti
   add_table(file, parameters);
   Export result;
   result.text = comment(file, "# ") + "/**:\n  ros__parameters:\n    kphi:\n" + parameters.text;
-  if (const auto vehicle = flown_vehicle(file, options)) result.text += vehicle_parameters(*vehicle);
+  if (const auto vehicle = flown_vehicle(file, options)) {
+    require_arms(*vehicle, "ros2");
+    result.text += vehicle_parameters(*vehicle);
+  }
   result.lost = {
       "hashes of the runs: only in the coefficient file",
       "the covariance's shape: parameters have no matrices; it is row by row, in the order of the parameters"};

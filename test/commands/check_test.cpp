@@ -76,6 +76,7 @@ TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
       say("check " + shipped("foldable_drone.yaml")).out,
       shipped("foldable_drone.yaml: valid vehicle\n") +
           "  body       half side 0.045 m, arms 0.117 m, propeller radius 0.0635 m\n"
+          "  rotors     4; drag torque up of 1 3, down of 2 4\n"
           "  speeds     0 to 19100 RPM\n"
           "  overlap    rim_arc\n"
           "  shape H    arms at 0 90 0 90°, occluded by 0 0 0 0°\n"
@@ -84,6 +85,18 @@ TEST_F(Check, SumsUpAVehicleWithTheOcclusionsOfItsShapes) {
           "  shape X    arms at 45 45 45 45°, occluded by 0 0 0 0°\n"
           "  dynamics   0.6 kg, of which 0.045 kg at each hub; 1.47 N per rotor carry it\n"
           "  control    position 6 6 15 1/s2, velocity 4 4 6 1/s, attitude 8.5 8.5 5 1/s, rates 12.7 12.7 5 1/s\n");
+}
+
+TEST_F(Check, SumsUpAVehicleOfAnyRotorsAndHubs) {
+  const std::string hexa = say("check " + shipped("foldable_hexa.yaml")).out;
+  EXPECT_THAT(hexa, HasSubstr("  rotors     6; drag torque up of 1 3 5, down of 2 4 6\n"));
+  EXPECT_THAT(hexa,
+              HasSubstr("  shape O    arms at 180 180 180 180 180 180°, occluded by 77 77.01 77.01 77 77.01 77.01°"));
+  EXPECT_THAT(hexa, HasSubstr("1.47 N per rotor carry it"));
+  EXPECT_THAT(
+      say("check " + shipped("telescoping_quad.yaml")).out,
+      HasSubstr("  shape O    hubs at (0.072, 0.072) (-0.072, 0.072) (-0.072, -0.072) (0.072, -0.072) m, occluded "
+                "by 39.67 39.67 39.67 39.67°"));
 }
 
 TEST_F(Check, SaysWhatAVehicleLacksThatASimulatedFlightNeeds) {

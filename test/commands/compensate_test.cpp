@@ -1,7 +1,10 @@
 #include "commands/compensate.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <random>
 #include <sstream>
 #include <streambuf>
 #include <string>
@@ -9,7 +12,10 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/number.hpp"
+#include "profiles/vehicle.hpp"
 #include "test/compensation/example_vehicle.hpp"
+#include "test/source_dir.hpp"
 
 namespace kphi::commands::compensate_test {
 
@@ -20,6 +26,12 @@ using namespace testing;
 const std::string kHeader = "theta1_deg,theta2_deg,theta3_deg,theta4_deg,thrust1_n,thrust2_n,thrust3_n,thrust4_n\n";
 const std::string kOutputHeader =
     "phi1_deg,phi2_deg,phi3_deg,phi4_deg,k1,k2,k3,k4,speed1_rpm,speed2_rpm,speed3_rpm,speed4_rpm,flags\n";
+
+std::vector<std::string> split_words(const std::string& csv) {
+  std::vector<std::string> fields(1);
+  for (const char c : csv.substr(0, csv.size() - 1)) c == ',' || c == '\n' ? fields.emplace_back() : fields.back() += c;
+  return fields;
+}
 
 struct Result {
   RowCounts counts;
@@ -141,6 +153,56 @@ TEST(CompensateRows, CountsRowsWithAnArmWhereNoServoGoes) {
   EXPECT_EQ(result.counts.written, 3u) << "180° is the end of the range and in it";
   EXPECT_EQ(result.counts.out_of_reach, 1u);
   EXPECT_THAT(result.output, HasSubstr(",3:arm_angle_beyond 4:arm_angle_beyond\n"));
+}
+
+/// Six arms by their angles, and the same hubs by their places: nothing but rounding is between them.
+TEST(CompensateRows, OfSixHubsAreThoseOfSixArms) {
+  const profiles::Vehicle vehicle = profiles::load_vehicle(test::source_dir() + "/profiles/foldable_hexa.yaml");
+  const Airframe airframe = profiles::airframe_of(vehicle);
+  const auto rows = [&](const std::string& header, const std::string& lines, RowShape shape) {
+    Compensator compensator = *Compensator::build(Rotors<ThrustCurve>(6, paper_line()), airframe).compensator;
+    std::istringstream in(header + lines);
+    std::ostringstream out, words;
+    const RowCounts counts = compensate_rows(in, out, words, compensator, RowFormat::csv, shape);
+    EXPECT_EQ(counts.written, 200u) << words.str();
+    return split_words(out.str());
+  };
+  std::string by_arms, by_hubs, arms_header, hubs_header;
+  for (int i = 1; i <= 6; ++i) {
+    arms_header += fmt::format("theta{}_deg,", i);
+    hubs_header += fmt::format("hub{0}_x_m,hub{0}_y_m,", i);
+  }
+  const std::string thrusts = "thrust1_n,thrust2_n,thrust3_n,thrust4_n,thrust5_n,thrust6_n\n";
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> angles(0, 180), newtons(0, 7);
+  for (int row = 0; row < 200; ++row) {
+    std::string asked;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const double angle = angles(random);
+      const HubPosition hub = hub_in_body(airframe, i, from_degrees(angle));
+      by_arms += fmt::format("{},", angle);
+      by_hubs += fmt::format("{},{},", hub.x.value(), hub.y.value());
+      asked += fmt::format("{}{}", newtons(random), i == 5 ? "\n" : ",");
+    }
+    by_arms += asked;
+    by_hubs += asked;
+  }
+  const auto arms = rows(arms_header + thrusts, by_arms, RowShape::arms);
+  const auto hubs = rows(hubs_header + thrusts, by_hubs, RowShape::hubs);
+  EXPECT_THAT(arms[0], "phi1_deg");
+  ASSERT_EQ(arms.size(), hubs.size());
+  ASSERT_EQ(arms.size(), 201u * 19);
+  int covered = 0;
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const auto a = parse_finite(arms[i]), b = parse_finite(hubs[i]);
+    if (!a || !b) {
+      ASSERT_EQ(arms[i], hubs[i]) << "names and flags";
+      continue;
+    }
+    ASSERT_NEAR(*a, *b, 1e-6 + 1e-9 * std::fabs(*a)) << "field " << i % 19 << " of line " << i / 19;
+    covered += i % 19 < 6 && *a > 0;
+  }
+  EXPECT_GT(covered, 100);
 }
 
 TEST(CompensateRows, OfAHeaderAloneIsAHeaderAlone) { EXPECT_EQ(compensated(kHeader).output, kOutputHeader); }

@@ -324,6 +324,37 @@ TEST_F(FitProgram, FliesTheTableWhereKOverPhiIsNoLine) {
   EXPECT_THAT(two.err, HasSubstr("names 2 files, but the vehicle has 4 rotors"));
 }
 
+TEST_F(FitProgram, ServesVehiclesOfSixArmsAndOfHubsThatAreTold) {
+  const std::string folder = steps("5x3"), file = folder + "/coefficients.yaml";
+  const struct {
+    std::string name, columns, values, widest;
+    std::size_t rotors;
+  } cases[] = {{"foldable_hexa", "theta1_deg,theta2_deg,theta3_deg,theta4_deg,theta5_deg,theta6_deg",
+                "180,60,180,60,180,60", "φ up to 77°", 6},
+               {"telescoping_quad", "hub1_x_m,hub1_y_m,hub2_x_m,hub2_y_m,hub3_x_m,hub3_y_m,hub4_x_m,hub4_y_m",
+                "0.072,0.072,-0.128,0.128,-0.072,-0.072,0.128,-0.128", "φ up to 40°", 4}};
+  for (const auto& [name, columns, values, widest, rotors] : cases) {
+    const std::string vehicle = test::source_dir() + "/profiles/" + name + ".yaml";
+    const Answer fitted = kphi({"fit", folder, "--no-report", "--vehicle", vehicle});
+    ASSERT_EQ(fitted.code, 0) << fitted.err;
+    EXPECT_THAT(fitted.err, HasSubstr("where " + name + " flies, " + widest));
+    EXPECT_THAT(kphi({"check", file, vehicle}).out, HasSubstr("where " + name + " flies, " + widest));
+    std::string thrusts, ones, files = file;
+    for (std::size_t i = 1; i <= rotors; ++i) thrusts += fmt::format(",thrust{}_n", i), ones += ",1";
+    for (std::size_t i = 1; i < rotors; ++i) files += "," + file;
+    const std::string demand = columns + thrusts + "\n" + values + ones + "\n";
+    const Answer answer = kphi({"compensate", "--coefficients", file, "--vehicle", vehicle, "--json"}, demand);
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    const auto speeds = json::parse(answer.out).at("speed_rpm");
+    ASSERT_EQ(speeds.size(), rotors);
+    for (std::size_t i = 0; i < rotors; ++i)
+      EXPECT_NEAR(speeds[i].get<double>() / speeds[i % 2].get<double>(), 1, 1e-4) << "every second one is covered";
+    EXPECT_GT(speeds[0].get<double>(), 1.02 * speeds[1].get<double>());
+    EXPECT_EQ(kphi({"compensate", "--coefficients", files, "--vehicle", vehicle, "--json"}, demand).out, answer.out);
+    EXPECT_EQ(kphi({"export", folder, "--to", "c", "--vehicle", vehicle}).code, 0);
+  }
+}
+
 TEST_F(FitProgram, RefusesALogWithoutOcclusionsWhoseThrustNoPowerMakes) {
   const std::string folder = steps("5x3");
   auto log = results::read_steps(folder + "/steps.csv");

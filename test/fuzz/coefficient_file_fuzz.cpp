@@ -21,7 +21,7 @@ const kphi::profiles::Vehicle& vehicle() {
     made.arm_angle_min = kphi::from_degrees(-90);
     made.arm_angle_max = kphi::from_degrees(180);
     made.speed_max = kphi::RadPerSec(2000);
-    for (auto& angle : made.shapes["X"]) angle = kphi::from_degrees(45);
+    made.shapes["X"] = kphi::compensation::Rotors<kphi::Radians>(4, kphi::from_degrees(45));
     made.dynamics.emplace();
     made.dynamics->mass_kg = 0.6;
     made.dynamics->hub_mass_kg = 0.045;

@@ -50,7 +50,7 @@ void parse(FileKind kind, const std::string& text) {
 
 TEST(ShippedFiles, AllLoad) {
   const auto paths = shipped_files();
-  EXPECT_EQ(paths.size(), 10u);
+  EXPECT_EQ(paths.size(), 12u);
   for (const std::string& path : paths) {
     const std::string text = read_text(path);
     EXPECT_NO_THROW(parse(kind_of(text), text)) << path;
@@ -128,6 +128,15 @@ TEST(ShippedFiles, DescribeTheFoldableDrone) {
   EXPECT_EQ(shapes, (std::set<std::string>{"X", "H", "O", "T"}));
   EXPECT_EQ(vehicle.shapes.at("O")[2], from_degrees(165.676));
   EXPECT_EQ(vehicle.shapes.at("T")[0], from_degrees(90));
+}
+
+TEST(ShippedFiles, DescribeAHexacopterAndOneWhoseArmsGetShorter) {
+  const Vehicle hexa = load_vehicle(shipped("foldable_hexa.yaml"));
+  EXPECT_EQ(rotors_of(hexa), 6u);
+  EXPECT_EQ(shapes_of(hexa), (std::vector<std::string>{"O", "X", "half"}));
+  const Vehicle quad = load_vehicle(shipped("telescoping_quad.yaml"));
+  EXPECT_EQ(rotors_of(quad), 4u);
+  EXPECT_EQ(hubs_of(quad, "O")[1].x, Metres(-0.072));
 }
 
 TEST(Schemas, AreEmbeddedAsTheyLieInTheFolder) {

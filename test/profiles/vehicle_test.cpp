@@ -41,38 +41,40 @@ TEST(Vehicle, HasOneArmPerCornerInOrderUnlessItSaysOtherwise) {
 
 TEST(Vehicle, EachMistakeEarnsItsRefusal) {
   expect_refusals(
-      refused, {// Refuses shapes that the servos cannot reach
-                {"165.676, 180]", "180.5, 180]",
-                 "9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
-                 "arm_angle_max_deg); the servo cannot go there; fix the angle or the range"},
-                // Refuses shapes without four arms
-                {"[45, 45, 45, 45]", "[45, 45, 45]", "8:6: shapes_deg.X: 3 values; write at least 4"},
-                {"[45, 45, 45, 45]", "[45, 45, 45, 45, 45]", "8:6: shapes_deg.X: 5 values; write at most 4"},
-                {"  X: [45, 45, 45, 45]\n  O: [180, 180, 165.676, 180]\n", "  {}\n",
-                 "8:3: shapes_deg: no keys; write at least 1…"},
-                // Refuses arms shorter than the propeller
-                {"0.117", "0.0635", "4:15: arm_length_m: 0.0635 is not above 0.0635 m (propeller_radius_m)…"},
-                // Wants metres in the key
-                {"half_side_m: 0.045", "half_side_mm: 45",
-                 "3:1: half_side_mm is not a key; the unit is part of the key: write half_side_m and the value in m"},
-                {"half_side_m: 0.045", "half_side_m: 45",
-                 "3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"},
-                // Refuses a file of another kind with one line
-                {"kphi-vehicle/1", "kphi-coefficients/2",
-                 "1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
-                 "format: kphi-vehicle/1"},
-                // Refuses ranges that are empty
-                {"speed_min_rpm: 0", "speed_min_rpm: 19100",
-                 "13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or fix the two"},
-                // Knows each corner and each measure of the overlap, and gives a corner one arm
-                {"[0, 90, 180, 270]", "[90, 0.0, 270, 180]", ""},
-                {"[0, 90, 180, 270]", "[0, 90, 90, 270]",
-                 "6:25: hinge_turn_deg[2]: corner 90 has an arm already; give each corner one arm"},
-                {"[0, 90, 180, 270]", "[0, 90, 180, 271]",
-                 "6:30: hinge_turn_deg[3]: 271 is not allowed; write one of 0, 90, 180, 270"},
-                {"half_side_m: 0.045\n", "half_side_m: 0.045\noverlap: rim\n", "4:10: overlap: …"},
-                {"half_side_m: 0.045\n", "", "1:1: half_side_m: missing, and body is missing as well…"},
-                {"kphi-vehicle/1", "kphi-vehicel/1", "1:9: format: text \"kphi-vehicel/1\" is not allowed…"}});
+      refused,
+      {// Refuses shapes that the servos cannot reach
+       {"165.676, 180]", "180.5, 180]",
+        "9:17: shapes_deg.O[2]: 180.5 is outside -90 to 180 degrees (arm_angle_min_deg, "
+        "arm_angle_max_deg); the servo cannot go there; fix the angle or the range"},
+       // Refuses shapes without four arms
+       {"[45, 45, 45, 45]", "[45, 45, 45]",
+        "8:6: shapes_deg.X: 3 angles, but the vehicle has 4 rotors; give one for each, in the same order"},
+       {"[45, 45, 45, 45]", "[45, 45, 45, 45, 45]", "8:6: shapes_deg.X: 5 angles, but the vehicle has 4 rotors…"},
+       {"  X: [45, 45, 45, 45]\n  O: [180, 180, 165.676, 180]\n", "  {}\n",
+        "8:3: shapes_deg: no keys; write at least 1…"},
+       // Refuses arms shorter than the propeller
+       {"0.117", "0.0635", "4:15: arm_length_m: 0.0635 is not above 0.0635 m (propeller_radius_m)…"},
+       // Wants metres in the key
+       {"half_side_m: 0.045", "half_side_mm: 45",
+        "3:1: half_side_mm is not a key; the unit is part of the key: write half_side_m and the value in m"},
+       {"half_side_m: 0.045", "half_side_m: 45",
+        "3:14: half_side_m: 45 is above 10 m; write a value from above 0 to 10 m"},
+       // Refuses a file of another kind with one line
+       {"kphi-vehicle/1", "kphi-coefficients/2",
+        "1:9: this is a coefficients file, expected a vehicle file; name a file that begins with "
+        "format: kphi-vehicle/1"},
+       // Refuses ranges that are empty
+       {"speed_min_rpm: 0", "speed_min_rpm: 19100",
+        "13:16: speed_max_rpm: 19100 is not above 19100 (speed_min_rpm); swap or fix the two"},
+       // Knows each corner and each measure of the overlap, and gives a corner one arm
+       {"[0, 90, 180, 270]", "[90, 0.0, 270, 180]", ""},
+       {"[0, 90, 180, 270]", "[0, 90, 90, 270]",
+        "6:25: hinge_turn_deg[2]: corner 90 has an arm already; give each corner one arm"},
+       {"[0, 90, 180, 270]", "[0, 90, 180, 271]",
+        "6:30: hinge_turn_deg[3]: 271 is not allowed; write one of 0, 90, 180, 270"},
+       {"half_side_m: 0.045\n", "half_side_m: 0.045\noverlap: rim\n", "4:10: overlap: …"},
+       {"half_side_m: 0.045\n", "", "1:1: half_side_m: missing, and body is missing as well…"},
+       {"kphi-vehicle/1", "kphi-vehicel/1", "1:9: format: text \"kphi-vehicel/1\" is not allowed…"}});
 }
 
 TEST(Vehicle, RefusesRangesThatAreEmpty) {
@@ -131,9 +133,7 @@ TEST(Vehicle, RefusesABodyThatIsNotConvexOrGoesClockwise) {
   expect_refusals(refusals_of, {{"[-0.1, 0.03], [-0.1, -0.03]", "[-0.1, -0.03], [-0.1, 0.03]",
                                  "4:14: body.corners_m: not the corners of a convex body…"},
                                 {", [-0.1, 0.03], [-0.1, -0.03], [0.1, -0.03]", ", [-0.1, 0.03]",
-                                 "4:14: body.corners_m: 2 values; write at least 3…"},
-                                {"    - {x_m: -0.1, y_m: -0.03, turn_deg: 180}\n", "",
-                                 "6:5: body.hinges: 3 values; write at least 4…"}});
+                                 "4:14: body.corners_m: 2 values; write at least 3…"}});
 }
 
 const std::string kFlightText =
@@ -174,7 +174,7 @@ TEST(Vehicle, TellsWhatASimulatedFlightNeeds) {
     EXPECT_EQ(vehicle.dynamics->rotor_lag_s, 0.033);
     EXPECT_EQ(vehicle.dynamics->air_drag_per_s, 0.3);
     EXPECT_EQ(vehicle.dynamics->morph_s, 1.5);
-    EXPECT_THAT(vehicle.dynamics->spin, ElementsAre(1, -1, 1, -1));
+    EXPECT_EQ(vehicle.dynamics->spin, (Rotors<int>{1, -1, 1, -1}));
     EXPECT_THAT(vehicle.control->gains.position, ElementsAre(6, 6, 15)) << "15: the paper's Table II";
     EXPECT_THAT(vehicle.control->gains.velocity, ElementsAre(4, 4, 6)) << "6: the paper's Table II";
     EXPECT_THAT(vehicle.control->gains.attitude, ElementsAre(8.5, 8.5, 5));
@@ -190,7 +190,7 @@ TEST(Vehicle, TellsWhatASimulatedFlightNeeds) {
 TEST(Vehicle, RefusesMassesAndGainsThatCannotBe) {
   expect_refusals(refused_in_flight,
                   {{"mass_kg: 0.6\n", "mass_kg: 0.18\n",
-                    "16:16: dynamics.hub_mass_kg: four times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
+                    "16:16: dynamics.hub_mass_kg: 4 times 0.045 kg leave nothing of 0.18 kg (mass_kg) for the "
                     "body; mass_kg is the mass of the whole vehicle, hub_mass_kg of one arm's end"},
                    {"  mass_kg: 0.6\n", "  mass_g: 600\n",
                     "15:3: mass_g is not a key of dynamics; the unit is part of the key: write mass_kg…"},
@@ -210,6 +210,87 @@ TEST(Vehicle, HasABodyThatIsAPlateOrTellsItsInertia) {
        {plate, plate + "  " + told, "18:23: dynamics.body_inertia_kg_m2: given together with body_height_m…"},
        {plate, "body_inertia_kg_m2: [1e-3, 1e-3, 2.1e-3]\n",
         "17:36: dynamics.body_inertia_kg_m2[2]: 0.0021 is more than the other two…"}});
+}
+
+TEST(Vehicle, MayHaveABodyOfSeveralConvexParts) {
+  const std::string hinges = "  hinges:\n";
+  const auto with = [&](const std::string& parts) {
+    return changed(vehicle_with_body(), hinges, "  more_corners_m: [" + parts + "]\n" + hinges);
+  };
+  const std::string front = "[[0.1, -0.01], [0.15, 0], [0.1, 0.01]]",
+                    back = "[[-0.1, 0.01], [-0.15, 0], [-0.1, -0.01]]";
+  const Vehicle vehicle = parse_vehicle(with(front + ", " + back), "v.yaml");
+  ASSERT_TRUE(vehicle.body->more[0] && vehicle.body->more[1]);
+  EXPECT_EQ(vehicle.body->more[1]->corner(1).x, Metres(-0.15));
+  EXPECT_TRUE(airframe_of(vehicle).polygon->more[0]);
+  const auto refusals_of = [&](const std::string& parts) {
+    return refusals([&] { return parse_vehicle(with(parts), "v.yaml"); });
+  };
+  EXPECT_THAT(refusals_of("[[0.09, -0.01], [0.15, 0], [0.09, 0.01]]"),
+              ElementsAre(StartsWith("5:20: body.more_corners_m[0]: overlaps another part of the body")));
+  EXPECT_THAT(refusals_of(front + ", " + front), ElementsAre(StartsWith("5:60: body.more_corners_m[1]: overlaps")));
+  EXPECT_THAT(refusals_of("[[0.1, 0.01], [0.15, 0], [0.1, -0.01]]"),
+              ElementsAre(StartsWith("5:20: body.more_corners_m[0]: not the corners of a convex body")));
+}
+
+std::vector<std::string> refused_by(const std::string& file, const std::string& from, const std::string& to) {
+  return refusals([&] { return parse_vehicle(changed(read_text(shipped(file)), from, to), "v.yaml"); });
+}
+
+TEST(Vehicle, MayHaveThreeToEightArmsWithAnAngleAndASpinForEach) {
+  const Vehicle hexa = load_vehicle(shipped("foldable_hexa.yaml"));
+  EXPECT_EQ(rotors_of(hexa), 6u);
+  EXPECT_EQ(rotors_of(airframe_of(hexa)), 6u);
+  EXPECT_EQ(hexa.shapes.at("half").size(), 6u);
+  EXPECT_EQ(hexa.dynamics->spin, (Rotors<int>{1, -1, 1, -1, 1, -1}));
+  EXPECT_NEAR(hubs_of(hexa, "X")[0].x.value(), 0.25, 1e-12) << "straight out from its corner";
+  const std::string last = "    - {x_m: 0.05, y_m: -0.0866, turn_deg: 240}\n";
+  expect_refusals(
+      [](const std::string& from, const std::string& to) { return refused_by("foldable_hexa.yaml", from, to); },
+      {{last, last + last + last + last,
+        "10:5: body.hinges: 9 rotors are too many; kphi knows vehicles with 3 to 8 rotors"},
+       {"X: [60, 60,", "X: [60,", "21:6: shapes_deg.X: 5 angles, but the vehicle has 6 rotors; give one for each…"},
+       {"[1, -1, 1, -1, 1, -1]", "[1, -1, 1, -1]",
+        "40:16: dynamics.rotor_spins: 4 spins, but the vehicle has 6 rotors; give one for each, in the same order"},
+       {"[1, -1, 1, -1, 1, -1]", "[1, 1, 1, 1, 1, 1]",
+        "40:16: dynamics.rotor_spins: no difference of thrusts turns the vehicle about z in the shape O; give half…"},
+       {"hub_mass_kg: 0.045", "hub_mass_kg: 0.2",
+        "34:16: dynamics.hub_mass_kg: 6 times 0.2 kg leave nothing of 0.9 kg…"}});
+}
+
+TEST(Vehicle, MayGiveThePlacesOfItsHubsInsteadOfArms) {
+  const Vehicle quad = load_vehicle(shipped("telescoping_quad.yaml"));
+  EXPECT_EQ(rotors_of(quad), 4u);
+  EXPECT_THAT(shapes_of(quad), ElementsAre("O", "X"));
+  EXPECT_EQ(hubs_of(quad, "O")[2].y, Metres(-0.072));
+  EXPECT_EQ(airframe_of(quad).polygon->hinges.size(), 4u) << "by which the library counts its rotors";
+  const std::string two = "  X: [[0.128, 0.128], [-0.128, 0.128], [-0.128, -0.128], [0.128, -0.128]]\n",
+                    begin = "half_side_m: 0.045 ";
+  expect_refusals(
+      [](const std::string& from, const std::string& to) { return refused_by("telescoping_quad.yaml", from, to); },
+      {{", [0.128, -0.128]]", "]", "12:6: shapes_m.X: 3 hubs, but the vehicle has 4 rotors…"},
+       {two, "  X: [[0.1, 0], [0.2, 0], [-0.1, 0], [-0.2, 0]]\n",
+        "12:6: shapes_m.X: the hubs are on one line, so no difference of thrusts tilts the vehicle about it; no "
+        "mixer…"},
+       {begin, "arm_length_m: 0.1\nhalf_side_m: 0.045 ",
+        "7:15: arm_length_m: belongs to arms with hinges, but shapes_m gives their hubs; keep one of the two"},
+       {begin, "shapes_deg: {X: [1, 2, 3, 4]}\nhalf_side_m: 0.045 ", "13:3: shapes_m: given together with shapes_deg…"},
+       {begin, "hinge_turn_deg: [0, 90, 180, 270]\nhalf_side_m: 0.045 ", "7:17: hinge_turn_deg: belongs to arms…"}});
+  EXPECT_THAT(refused("shapes_deg:", "shapes_m:"), testing::Not(testing::IsEmpty())) << "angles are no places";
+  EXPECT_THAT(refused("arm_length_m: 0.117\n", ""), ElementsAre(StartsWith("1:1: arm_length_m: missing; shapes_deg")));
+}
+
+/// Three in a line make roll and pitch no more than four do.
+TEST(Vehicle, OfThreeRotorsInALineIsRefusedAndOfThreeRoundTheBodyIsNot) {
+  const std::string text = changed(read_text(shipped("telescoping_quad.yaml")), "[1, -1, 1, -1]", "[1, -1, 1]");
+  const auto of = [&](const std::string& shape) {
+    const std::size_t begin = text.find("  X: "), end = text.find("\nspeed_min");
+    return refusals(
+        [&] { return parse_vehicle(text.substr(0, begin) + "  X: " + shape + "\n" + text.substr(end), "v"); });
+  };
+  EXPECT_THAT(of("[[0.15, 0], [0, 0], [-0.15, 0]]"),
+              ElementsAre(StartsWith("12:6: shapes_m.X: the hubs are on one line")));
+  EXPECT_THAT(of("[[0.15, 0], [-0.1, 0.13], [-0.1, -0.13]]"), ElementsAre());
 }
 
 TEST(Vehicle, HasOneBody) {

@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include "base/error.hpp"
 #include "profiles/strict_yaml.hpp"
+#include "test/profiles/refusals.hpp"
 #include "test/source_dir.hpp"
 
 namespace kphi::profiles {
@@ -33,7 +35,7 @@ TEST(World, WithoutMoreHasNoErrorsAndTheDragOfTheVehicle) {
   EXPECT_EQ(world.truth.gamma, 1.2);
   EXPECT_EQ(world.truth.mass, 1);
   EXPECT_EQ(world.truth.cog_error.norm(), 0);
-  EXPECT_EQ(world.truth.wiring, (std::array<int, 4>{0, 1, 2, 3}));
+  EXPECT_FALSE(world.truth.wired_crosswise());
   EXPECT_FALSE(world.drag);
 }
 
@@ -47,9 +49,29 @@ TEST(World, ReadsAllThatTheExampleShows) {
   EXPECT_EQ(world.truth.estimate_delay_s, 0.02);
 }
 
+TEST(World, IsOfAVehicleWithAsManyRotorsAndOfArmsThatHaveAngles) {
+  const auto complaint_of = [](const std::string& line, const char* vehicle) -> std::string {
+    try {
+      require_vehicle(parse_world(std::string(kWorldText) + line + "\n", "w.yaml"), load_vehicle(shipped(vehicle)));
+    } catch (const ConfigurationError& refused) {
+      return refused.what();
+    }
+    return "";
+  };
+  const std::string shares = "rotor_thrust_share: [1, 1, 0.9, 1]";
+  EXPECT_EQ(complaint_of(shares, "foldable_drone.yaml"), "");
+  EXPECT_EQ(complaint_of("", "foldable_hexa.yaml"), "");
+  EXPECT_THAT(complaint_of(shares, "foldable_hexa.yaml"), HasSubstr("w.yaml: its lists are of 4 rotors, but"));
+  EXPECT_EQ(complaint_of("arm_error_deg: [0, 0, 0, 0]", "telescoping_quad.yaml"), "");
+  EXPECT_THAT(complaint_of("arm_error_deg: [0, 0, 1, 0]", "telescoping_quad.yaml"), HasSubstr("shapes_m"));
+}
+
 TEST(World, RefusesInOneLineWithItsPlace) {
   const auto with = [](const std::string& line) { return complaint(std::string(kWorldText) + line + "\n"); };
   EXPECT_THAT(with("arm_wiring: [1, 2, 2, 4]"), HasSubstr("w.yaml:6:20: arm_wiring[2]: arm 2 is named twice"));
+  EXPECT_THAT(with("arm_wiring: [1, 2, 3, 5]"), HasSubstr("6:23: arm_wiring[3]: there is no arm 5 among 4"));
+  EXPECT_THAT(with("arm_wiring: [1, 2, 3, 4]\narm_error_deg: [0, 0, 0, 0, 0, 0]"),
+              HasSubstr("arm_wiring: 4 values, but another list has 6; give one for each rotor"));
   EXPECT_THAT(with("servo_lag_s: -1"), HasSubstr("6:14: servo_lag_s"));
   EXPECT_THAT(with("servo_lag_ms: 30"), HasSubstr("servo_lag_ms is not a key"));
   EXPECT_THAT(complaint("format: kphi-vehicle/1\n"), HasSubstr("expected a world file"));

@@ -23,7 +23,7 @@ struct World {
     const double hover = std::sqrt(kGravity * x.mass.mass_kg / 4 / kThrustCoefficient);
     AircraftState state = level_state({from, {0, 0, 0}}, x.mass, hover);
     for (int i = 0; i < steps; ++i) {
-      state = plant.step(state, kWidth, {&x, &x, &x}, Eigen::Vector4d::Constant(hover));
+      state = plant.step(state, kWidth, {&x, &x, &x}, speeds_of(hover, hover, hover, hover));
     }
     return state;
   }
@@ -53,13 +53,13 @@ AircraftState tumbling(const Configuration& configuration, Random& random) {
 
 TEST_F(InCleanAir, KeepsMomentumAndEnergyOfABodyThatNothingTouches) {
   Random random(4);
-  for (const Angles& shape : {vehicle.x, vehicle.o, compensation::shape_t()}) {
+  for (const Angles& shape : {vehicle.x, vehicle.o, Angles(compensation::shape_t())}) {
     const Configuration still = plant.configuration(shape, {});
     AircraftState state = tumbling(still, random);
     const Eigen::Vector3d momentum = momentum_in_world(state);
     const double energy = spin_energy(state, still.mass);
     for (int i = 0; i < 2500; ++i) {
-      state = plant.step(state, kWidth, {&still, &still, &still}, Eigen::Vector4d::Zero());
+      state = plant.step(state, kWidth, {&still, &still, &still}, RotorSpeeds::Zero());
       ASSERT_NEAR(state.y.segment<4>(6).norm(), 1, 1e-15);
     }
     EXPECT_LT((momentum_in_world(state) - momentum).norm(), 1e-6 * momentum.norm());
@@ -82,7 +82,7 @@ TEST_F(InCleanAir, KeepsMomentumWhileTheArmsFoldAndTurnsTheBodyAgainstThem) {
   double slowest = 0;
   for (int i = 0; i * kWidth < kMorphSeconds; ++i) {
     const Configuration middle = at((i + 0.5) * kWidth), end = at((i + 1) * kWidth);
-    state = plant.step(state, kWidth, {&now, &middle, &end}, Eigen::Vector4d::Zero());
+    state = plant.step(state, kWidth, {&now, &middle, &end}, RotorSpeeds::Zero());
     now = end;
     slowest = std::min(slowest, body_rates(state, now.mass).z());
     ASSERT_LT(momentum_in_world(state).norm(), 1e-12);
@@ -103,7 +103,7 @@ TEST_F(InCleanAir, BodyMotionIsTheDerivativeOfTheBodysPosition) {
   const Configuration now = at(t), middle = at(t + width / 2), end = at(t + width);
   Random random(8);
   const AircraftState state = tumbling(now, random);
-  const AircraftState next = plant.step(state, width, {&now, &middle, &end}, Eigen::Vector4d::Zero());
+  const AircraftState next = plant.step(state, width, {&now, &middle, &end}, RotorSpeeds::Zero());
   const Eigen::Vector3d slope = (body_motion(next, end.mass).position - body_motion(state, now.mass).position) / width;
   const Eigen::Vector3d mean = (body_motion(next, end.mass).velocity + body_motion(state, now.mass).velocity) / 2;
   EXPECT_LT((slope - mean).norm(), 1e-6);
@@ -125,7 +125,7 @@ TEST_F(InCleanAir, RotorsFollowTheirCommandWithTheirTimeConstant) {
   AircraftState state = level_state({{0, 0, 0}, {0, 0, 0}}, x.mass, 100);
   const int steps = 33;  // 66 ms, two time constants
   for (int i = 0; i < steps; ++i) {
-    state = plant.step(state, kWidth, {&x, &x, &x}, Eigen::Vector4d::Constant(1100));
+    state = plant.step(state, kWidth, {&x, &x, &x}, speeds_of(1100, 1100, 1100, 1100));
   }
   EXPECT_NEAR(state.rotors()[2], 1100 - 1000 * std::exp(-2.0), 1e-3);
 }
@@ -172,7 +172,7 @@ AircraftState tumble(int steps) {
   const double width = 1.2 / steps;
   for (int i = 0; i < steps; ++i) {
     const Configuration begin = at(i * width), middle = at((i + 0.5) * width), end = at((i + 1) * width);
-    state = plant.step(state, width, {&begin, &middle, &end}, Eigen::Vector4d(1000, 900, 1100, 950));
+    state = plant.step(state, width, {&begin, &middle, &end}, speeds_of(1000, 900, 1100, 950));
   }
   return state;
 }

@@ -46,8 +46,15 @@ inline Vehicle example_vehicle() {
 }
 
 inline const Shadow& example_shadow() {
-  static const Shadow shadow(compensation::example_airframe());
+  static const Shadow shadow(example_vehicle());
   return shadow;
+}
+
+/// rad/s, of four rotors.
+inline RotorSpeeds speeds_of(double a, double b, double c, double d) {
+  RotorSpeeds speeds = RotorSpeeds::Zero();
+  speeds.head<4>() << a, b, c, d;
+  return speeds;
 }
 
 inline compensation::ThrustCurve bench_line() { return compensation::example_line(1.025, -0.0028889 * 1.02); }

@@ -80,7 +80,7 @@ TEST(Control, OfALineWithTwiceTheSlopeOvershoots) {
 TEST(Control, OfArmsTakenForOneAnotherIsWorseSideways) {
   Scene scene = clean_scene();
   const double right = hover_error(kHoverCompensated, scene).head<2>().norm();
-  for (const std::array<int, 4>& order : std::vector<std::array<int, 4>>{{1, 2, 3, 0}, {2, 3, 0, 1}, {3, 0, 1, 2}}) {
+  for (const Rotors<std::size_t>& order : std::vector<Rotors<std::size_t>>{{1, 2, 3, 0}, {2, 3, 0, 1}, {3, 0, 1, 2}}) {
     scene.pilot.arm_order = order;
     EXPECT_GT(hover_error(kHoverCompensated, scene).head<2>().norm(), 1.2 * right)
         << order[0] << order[1] << order[2] << order[3];

@@ -202,6 +202,80 @@ TEST_F(Fly, FliesABodyThatIsNoSquareAndASquareThatIsGivenAsAnOutlineAsTheSquare)
   EXPECT_LT(std::fabs(helped), 0.5 * plain);
 }
 
+/// A body of eight corners with an arm at each.
+std::string octo_text() {
+  std::string corners, hinges;
+  for (int i = 0; i < 8; ++i) {
+    const double angle = kPi / 4 * i, x = 0.12 * std::cos(angle), y = 0.12 * std::sin(angle);
+    corners += fmt::format("{}[{:.5f}, {:.5f}]", i == 0 ? "" : ", ", x, y);
+    hinges += fmt::format("    - {{x_m: {:.5f}, y_m: {:.5f}, turn_deg: {}}}\n", x, y, 45 * i - 67.5);
+  }
+  const std::string hexa = bytes_of(source_dir() + "/profiles/foldable_hexa.yaml");
+  std::string text = "format: kphi-vehicle/1\nname: octo\nbody:\n  corners_m: [" + corners + "]\n  hinges:\n" + hinges +
+                     "arm_length_m: 0.155\npropeller_radius_m: 0.0635\nshapes_deg:\n"
+                     "  open: [67.5, 67.5, 67.5, 67.5, 67.5, 67.5, 67.5, 67.5]\n"
+                     "  folded: [180, 180, 180, 180, 180, 180, 180, 180]\n" +
+                     hexa.substr(hexa.find("\narm_angle_min_deg"));
+  const std::string spins = "[1, -1, 1, -1, 1, -1]", mass = "mass_kg: 0.90";
+  text.replace(text.find(spins), spins.size(), "[1, -1, 1, -1, 1, -1, 1, -1]");
+  return text.replace(text.find(mass), mass.size(), "mass_kg: 1.20");
+}
+
+TEST_F(Fly, FliesSixAndEightRotorsAndArmsThatGetShorter) {
+  const std::string octo = *folder_ / "octo.yaml";
+  std::ofstream(octo) << octo_text();
+  const struct {
+    std::string vehicle;
+    std::size_t rotors;
+    std::vector<std::string> shapes;
+  } cases[] = {{source_dir() + "/profiles/foldable_hexa.yaml", 6, {}},
+               {octo, 8, {"--open", "open", "--folded", "folded"}},
+               {source_dir() + "/profiles/telescoping_quad.yaml", 4, {}}};
+  for (const auto& [vehicle, rotors, shapes] : cases) {
+    const auto sag = [&, file = vehicle, named = shapes](const char* experiment, std::vector<std::string> options) {
+      options.insert(options.end(), {"--json", "--experiment", experiment});
+      options.insert(options.end(), named.begin(), named.end());
+      const Outcome flown = fly(options, coefficients_, file);
+      EXPECT_EQ(flown.code, 0) << file << flown.err;
+      const auto flight = nlohmann::json::parse(flown.out)["flights"][0];
+      EXPECT_FALSE(flight["lost"]) << file << experiment;
+      return flight["legs"][1]["mean_error_m"][2].get<double>();
+    };
+    const std::string out = *folder_ / fmt::format("flown_{}", rotors);
+    const double plain = sag("hover_xo_nc", {"--draws", "2"}), helped = sag("hover_xo_c", {"--out", out});
+    EXPECT_GT(plain, 0.05) << vehicle;
+    EXPECT_LT(std::fabs(helped), 0.5 * plain) << vehicle;
+    EXPECT_THAT(bytes_of(fs::path(out) / "hover_xo_c.csv"), HasSubstr(fmt::format(",speed{}_rad_s\n", rotors)));
+  }
+  const Outcome judged = fly({}, coefficients_, cases[0].vehicle);
+  EXPECT_EQ(judged.code, 0) << judged.out;
+  EXPECT_THAT(
+      judged.out,
+      HasSubstr("The paper's drone has four rotors, this vehicle 6: the paper's numbers are no measure of it."));
+}
+
+TEST_F(Fly, RefusesWorldsCoefficientsAndVehiclesOfOtherRotorsWithOneLine) {
+  const std::string hexa = source_dir() + "/profiles/foldable_hexa.yaml", three = *folder_ / "three.yaml";
+  std::string text = bytes_of(source_dir() + "/profiles/telescoping_quad.yaml");
+  for (const auto& [from, to] : {std::pair<std::string, std::string>{", [0.128, -0.128]]", "]"},
+                                 {", [0.072, -0.072]]", "]"},
+                                 {"[1, -1, 1, -1]", "[1, -1, 1]"}})
+    text.replace(text.find(from), from.size(), to);
+  std::ofstream(three) << text;
+  const struct {
+    Outcome flown;
+    const char* says;
+  } refused[] = {
+      {fly({"--world", source_dir() + "/profiles/world_example.yaml"}, coefficients_, hexa), "are of 4 rotors, but"},
+      {fly({}, coefficients_ + "," + coefficients_, hexa), "names 2 files, but the vehicle has 6 rotors"},
+      {fly({"--folded", "T"}, coefficients_, hexa), "it has O, X, half: name two of them with --open and --folded"},
+      {fly({}, coefficients_, three), "three rotors make no yaw of their own"}};
+  for (const auto& [flown, says] : refused) {
+    EXPECT_EQ(flown.code, 2) << says;
+    EXPECT_THAT(flown.err, HasSubstr(says));
+  }
+}
+
 TEST_F(Fly, FliesInAWorldThatTheControllerDoesNotKnowAndSaysWhetherTheCoefficientsAreFitToFly) {
   const Outcome assumed = fly({"--draws", "8"});
   EXPECT_EQ(assumed.code, 0) << assumed.out;

@@ -129,14 +129,14 @@ TEST(RateControl, CancelsTheGyroscopicTorque) {
 Pilot example_pilot() { return *Pilot::build(example_vehicle(), four(bench_line()), example_settings()); }
 
 /// Of a body that stands on its reference.
-Eigen::Vector4d speeds_on_reference(Pilot& pilot) {
+RotorSpeeds speeds_on_reference(Pilot& pilot) {
   pilot.look(Reference(), {{0, 0, kHeight}, {0, 0, 0}}, kLevel);
   return pilot.act({0, 0, 0});
 }
 
 TEST(Pilot, CarriesTheWeightInEveryShape) {
   Pilot pilot = example_pilot();
-  for (const Angles& shape :
+  for (const Angles shape :
        {compensation::shape_x(), compensation::shape_h(), compensation::shape_t(), compensation::shape_o()}) {
     pilot.set_arms(shape);
     (void)speeds_on_reference(pilot);
@@ -154,7 +154,7 @@ TEST(Pilot, TurnsCoveredRotorsFasterOnlyWhenItCompensates) {
     pilot.compensate(on);
     return speeds_on_reference(pilot);
   };
-  for (const Angles& open : {compensation::shape_x(), compensation::shape_h(), compensation::shape_t()}) {
+  for (const Angles open : {compensation::shape_x(), compensation::shape_h(), compensation::shape_t()}) {
     EXPECT_EQ(speeds_in(open, true), speeds_in(open, false)) << "nothing is covered in X, H and T: bit for bit";
   }
   EXPECT_GT(speeds_in(compensation::shape_o(), true).sum(), 1.05 * speeds_in(compensation::shape_o(), false).sum());
@@ -167,7 +167,7 @@ TEST(Pilot, HoldsYawStillInOBecauseItAllocatesWithTheTorqueOfCoveredRotors) {
   const double k_t = bench_line().thrust_coefficient().value();
   for (const bool on : {true, false}) {
     pilot.compensate(on);
-    const Eigen::Vector4d squares = speeds_on_reference(pilot).cwiseAbs2();
+    const RotorSpeeds squares = speeds_on_reference(pilot).cwiseAbs2();
     const Build build = example_build();
     double yaw = 0;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -182,7 +182,7 @@ TEST(Pilot, KeepsEveryRotorWithinWhatItCanGiveWhateverIsDemanded) {
   Random random(12);
   const double fastest = example_vehicle().airframe.fastest_speed.value();
   for (int i = 0; i < 3000; ++i) {
-    Angles arms;
+    Angles arms(4);
     for (Radians& arm : arms) arm = Radians(random.uniform(-1.5, 3.1));
     pilot.set_arms(arms);
     pilot.compensate(random.uniform(0, 1) > 0.5);
@@ -192,7 +192,7 @@ TEST(Pilot, KeepsEveryRotorWithinWhatItCanGiveWhateverIsDemanded) {
       return Eigen::Vector3d(random.normal(0, 2), random.normal(0, 2), random.normal(0, 2));
     };
     pilot.look(Reference(), {anywhere(), anywhere()}, attitude);
-    const Eigen::Vector4d speeds = pilot.act(10 * anywhere());
+    const RotorSpeeds speeds = pilot.act(10 * anywhere());
     for (std::size_t j = 0; j < 4; ++j) {
       ASSERT_GE(pilot.thrusts()[j].value(), 0);
       ASSERT_LE(pilot.thrusts()[j].value(), pilot.compensator().thrust_max()[j].value() * (1 + 1e-12));

@@ -87,9 +87,10 @@ TEST(Shadow, OfTheDefaultVehicleInOIsThePapersSixtyFiveDegrees) {
 }
 
 TEST(Shadow, OfEachArmIsThatOfItsOwnHinge) {
-  compensation::Airframe airframe = compensation::example_airframe();
+  Vehicle vehicle = example_vehicle();
+  compensation::Airframe& airframe = vehicle.airframe;
   airframe.mirrored = {false, true, false, true};
-  const Shadow mirrored(airframe);
+  const Shadow mirrored(vehicle);
   for (std::size_t arm = 0; arm < 4; ++arm) {
     EXPECT_NEAR(mirrored.arc(arm, from_degrees(170)), example_shadow().arc(0, from_degrees(170)), 1e-9) << arm;
   }
@@ -99,7 +100,7 @@ TEST(Shadow, OfEachArmIsThatOfItsOwnHinge) {
   for (std::size_t i = 0; i < 4; ++i) {
     airframe.polygon->hinges[i] = {{Metres(i < 2 ? 0.3 : 0.045), Metres(0.045)}, Radians(0), false};
   }
-  const Shadow uneven(airframe);
+  const Shadow uneven(vehicle);
   EXPECT_EQ(uneven.arc(0, from_degrees(180)), 0);
   EXPECT_GT(uneven.arc(2, from_degrees(180)), 1);
 }

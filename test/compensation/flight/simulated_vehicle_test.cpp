@@ -23,7 +23,7 @@ TEST(MassProperties, OfTheFourShapesAreThoseComputedByHand) {
            {"T", compensation::shape_t(), {0, 17.55}, {2.699, 2.884, 5.471}},
            {"O", compensation::arms_at(180, 180, 165.676, 180), {-0.27, -2.17}, {1.138, 0.965, 1.992}},
        }) {
-    const MassProperties found = mass_properties(example_vehicle(), known.arms, {});
+    const MassProperties found = mass_properties(example_vehicle(), known.arms);
     EXPECT_LT((1e3 * found.cog - known.cog_mm).norm(), 6e-3) << known.shape;
     EXPECT_LT((1e3 * found.inertia.diagonal() - known.inertia).norm(), 4e-3) << known.shape;
     EXPECT_LT((found.inertia * found.inverse_inertia - Eigen::Matrix3d::Identity()).norm(), 1e-12) << known.shape;
@@ -35,8 +35,8 @@ TEST(MassProperties, OfASquareGivenAsAPolygonAreThoseOfTheSquare) {
   Vehicle vehicle = example_vehicle();
   vehicle.airframe.polygon = compensation::square_as_polygon(Metres(0.045));
   vehicle.airframe.half_side = Metres(0);
-  for (const Angles& shape : {compensation::shape_x(), compensation::shape_t(), compensation::shape_o()}) {
-    const std::array<double, 4> rates{{1, -2, 3, 0.5}};
+  for (const Angles shape : {compensation::shape_x(), compensation::shape_t(), compensation::shape_o()}) {
+    const Rotors<double> rates{1.0, -2.0, 3.0, 0.5};
     const MassProperties found = mass_properties(vehicle, shape, rates);
     const MassProperties square = mass_properties(example_vehicle(), shape, rates);
     EXPECT_LT((found.cog - square.cog).norm(), 1e-15);
@@ -53,7 +53,7 @@ TEST(MassProperties, OfAnyConvexPlateAreThoseOfItsManySmallPieces) {
   vehicle.airframe.polygon = compensation::square_as_polygon(Metres(0.045));
   vehicle.airframe.polygon->outline = *compensation::ConvexPolygon::from(corners, 4);
   vehicle.build.hub_mass_kg = 1e-12;
-  const MassProperties found = mass_properties(vehicle, vehicle.x, {});
+  const MassProperties found = mass_properties(vehicle, vehicle.x);
 
   std::vector<Eigen::Vector2d> pieces;
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
@@ -83,9 +83,9 @@ TEST(MassProperties, OfAnyConvexPlateAreThoseOfItsManySmallPieces) {
 TEST(MassProperties, TakeTheBodysInertiaFromTheFileWhereItIsGiven) {
   Vehicle vehicle = example_vehicle();
   vehicle.build.body_inertia = Eigen::Vector3d(1e-3, 2e-3, 2.5e-3);
-  const MassProperties told = mass_properties(vehicle, vehicle.x, {});
+  const MassProperties told = mass_properties(vehicle, vehicle.x);
   vehicle.build.body_inertia = Eigen::Vector3d(2e-3, 2e-3, 2.5e-3);
-  const MassProperties more = mass_properties(vehicle, vehicle.x, {});
+  const MassProperties more = mass_properties(vehicle, vehicle.x);
   EXPECT_NEAR(more.inertia(0, 0) - told.inertia(0, 0), 1e-3, 1e-15);
   EXPECT_NEAR((more.inertia - told.inertia).norm(), 1e-3, 1e-15);
   EXPECT_NEAR(told.inertia(2, 2), 2.5e-3 + 4 * 0.045 * 2 * std::pow(0.045 + 0.117 * std::sqrt(0.5), 2), 1e-12);
@@ -95,8 +95,8 @@ TEST(MassProperties, OfMovingArmsAreThoseOfTheirPointMasses) {
   const Vehicle vehicle = example_vehicle();
   Random random(3);
   for (int i = 0; i < 200; ++i) {
-    Angles arms, later;
-    std::array<double, 4> rates{};
+    Angles arms(4), later(4);
+    Rotors<double> rates(4);
     const double width = 1e-6;
     for (std::size_t j = 0; j < 4; ++j) {
       arms[j] = Radians(random.uniform(-1.5, 3.1));
@@ -136,7 +136,7 @@ struct ArmMotionFromX : testing::Test {
 TEST_F(ArmMotionFromX, RestsWhereItBegan) {
   EXPECT_FALSE(motion.moving(0));
   EXPECT_EQ(motion.angles(0), vehicle.x);
-  EXPECT_EQ(motion.rates(3), (std::array<double, 4>{}));
+  EXPECT_EQ(motion.rates(3), Rotors<double>(4));
 }
 
 TEST_F(ArmMotionFromX, ArrivesExactlyAfterTheStatedTimeFromRestToRest) {

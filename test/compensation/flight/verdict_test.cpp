@@ -30,7 +30,7 @@ struct Judged {
   Judgement judgement;
 };
 
-Judged judged(const compensation::ThrustCurve& curve, const std::array<int, 4>& wiring = {{0, 1, 2, 3}}) {
+Judged judged(const compensation::ThrustCurve& curve, const Rotors<std::size_t>& wiring = {0, 1, 2, 3}) {
   Scene scene = example_scene();
   scene.curves = four(curve);
   scene.truth.wiring = wiring;
@@ -89,7 +89,7 @@ TEST(Verdict, SaysWhatItIsBlindTo) {
 }
 
 TEST(Verdict, OfArmsThatAreWiredCrosswiseIsNotFitToFly) {
-  EXPECT_NE(judged(bench_line(), {{2, 1, 0, 3}}).judgement.fitness, Fitness::fit_to_fly);
+  EXPECT_NE(judged(bench_line(), {2, 1, 0, 3}).judgement.fitness, Fitness::fit_to_fly);
 }
 
 TEST(Verdict, OfOneSetOfCircumstancesSaysThatThereAreMore) {

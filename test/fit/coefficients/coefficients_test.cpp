@@ -178,6 +178,16 @@ TEST(ErrorInFlight, IsThatOfTheVerdictForThePhiAndSpeedsOfTheVehicleAlone) {
   EXPECT_THAT(words(of(vehicle(90, 0, 25000)), vehicle(90, 0, 25000)), HasSubstr("of its 0 to 25000 RPM what was"));
 }
 
+/// In the shapes and on the straight ways between them.
+TEST(ErrorInFlight, IsThatOfTheWaysOfHubsThatTheVehicleTells) {
+  const auto file = compensation::parse_coefficients(
+      format_coefficients(analysed(identify(study_campaign({}, 4).steps)), provenance()), "k.yaml");
+  profiles::Vehicle quad = profiles::load_vehicle(test::source_dir() + "/profiles/telescoping_quad.yaml");
+  EXPECT_NEAR(error_in_flight(file, quad)->phi_deg, 39.67, 0.01) << "in O";
+  for (auto& hub : quad.hubs.at("O")) hub = {-hub.x, hub.y};
+  EXPECT_GT(error_in_flight(file, quad)->phi_deg, 60) << "half way the hubs are beside the middle of an edge";
+}
+
 TEST(ErrorInFlight, IsUnknownWhereNobodyMeasured) {
   auto steps = study_campaign({}, 4).steps;
   for (auto& step : steps) step.occlusion_deg /= 9;  // up to 30°

@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "base/error.hpp"
 #include "compensation/compensator.hpp"
 #include "compensation/mixing.hpp"
 #include "fit/coefficients/coefficients.hpp"
@@ -187,6 +188,85 @@ TEST(ExportFlown, ToCAsTheLibraryInDoubleAndInFloat) {
                                  with_name(kFlightInC, "kphi_foldable_drone"), "k.h",
                                  to_c(file, {.vehicle = &square}).text, KPHI_DOUBLE_LIBRARY),
                 file, square, 1e-12);
+}
+
+/// Of any number of rotors, by arms or by hubs; thrusts of 1, 2, 3 N and so on in the reference shape.
+constexpr const char* kAnyFlightInC = R"(
+#include <stdio.h>
+#include "k.h"
+int main(void) {
+  kphi_curve curves[KPHI_MAX_ROTORS];
+  const kphi_airframe airframe = @VEHICLE@_airframe();
+  static kphi_compensator compensator;
+  kphi_real thrusts[KPHI_MAX_ROTORS], speeds[KPHI_MAX_ROTORS];
+  int i;
+  for (i = 0; i < @VEHICLE@_ROTORS; ++i) curves[i] = kphi_5x3_curve(), thrusts[i] = (kphi_real)(1 + i);
+  if (kphi_compensator_build(&compensator, curves, &airframe, KPHI_LAW_CLAMPED) != 0) return 1;
+  @TELL@;
+  kphi_speeds_for(&compensator, thrusts, speeds, NULL);
+  for (i = 0; i < @VEHICLE@_ROTORS; ++i) printf("%d %.17g\n", @VEHICLE@_SPINS[i], (double)speeds[i]);
+  return 0;
+}
+)";
+
+TEST(ExportFlown, ToCOfSixArmsAndOfHubsThatAreTold) {
+  if (!works("cc --version")) GTEST_SKIP() << "no compiler";
+  const auto file = coefficients(CurveForm::line, false);
+  const struct {
+    std::string name, tell;
+  } cases[] = {{"foldable_hexa", "kphi_set_arms(&compensator, kphi_foldable_hexa_REFERENCE_RAD)"},
+               {"telescoping_quad", "kphi_set_hubs(&compensator, kphi_telescoping_quad_REFERENCE_M, NULL, 0)"}};
+  for (const auto& [name, tell] : cases) {
+    const std::string path = test::source_dir() + "/profiles/" + name + ".yaml";
+    profiles::Vehicle vehicle = profiles::load_vehicle(path);
+    vehicle.shapes.erase("X");  // of the folded shape
+    vehicle.hubs.erase("X");
+    std::string flight = with_name(kAnyFlightInC, "kphi_" + name);
+    flight.replace(flight.find("@TELL@"), 6, tell);
+    std::istringstream out(compiled_and_run("cc -std=c99 -Wall -Wextra -Wpedantic -Wconversion -Werror ", "flight.c",
+                                            flight, "k.h", to_c(file, {.vehicle = &vehicle}).text,
+                                            KPHI_DOUBLE_LIBRARY));
+    const std::size_t rotors = profiles::rotors_of(vehicle);
+    Compensator compensator =
+        *Compensator::build(Rotors<compensation::ThrustCurve>(rotors, file.curve), profiles::airframe_of(vehicle))
+             .compensator;
+    Rotors<Newtons> thrusts(rotors);
+    for (std::size_t i = 0; i < rotors; ++i) thrusts[i] = Newtons(1.0 + static_cast<double>(i));
+    compensator.set_hubs(profiles::hubs_of(vehicle, "O"));
+    const auto wanted = compensator.speeds_for(thrusts).speeds;
+    EXPECT_LT(compensator.scaling_factors()[rotors - 1], 0.95) << name;
+    for (std::size_t i = 0; i < rotors; ++i) {
+      int spin = 0;
+      double speed = 0;
+      ASSERT_TRUE(out >> spin >> speed) << name;
+      EXPECT_EQ(spin, i % 2 == 0 ? 1 : -1);
+      EXPECT_NEAR(speed / wanted[i].value(), 1, 1e-6) << name << i;
+    }
+  }
+}
+
+TEST(ExportFlown, OfHubsThatAreToldGoesToCAlone) {
+  const auto file = coefficients(CurveForm::line, false);
+  const profiles::Vehicle quad = profiles::load_vehicle(test::source_dir() + "/profiles/telescoping_quad.yaml"),
+                          hexa = profiles::load_vehicle(test::source_dir() + "/profiles/foldable_hexa.yaml");
+  for (const auto& [write, name] : {std::pair{&to_px4, "px4"}, {&to_ros2, "ros2"}, {&to_ardupilot, "ardupilot"}}) {
+    try {
+      (void)write(file, {.vehicle = &quad});
+      ADD_FAILURE() << name;
+    } catch (const ConfigurationError& refused) {
+      EXPECT_THAT(refused.what(), HasSubstr(std::string("--to ") + name + ": it computes the hubs from arm angles"));
+    }
+    EXPECT_NO_THROW((void)write(file, {.vehicle = &hexa})) << name;
+  }
+  profiles::Vehicle of_parts = hexa;
+  const compensation::Position nose[] = {
+      {Metres(0.2), Metres(-0.02)}, {Metres(0.25), Metres(0)}, {Metres(0.2), Metres(0.02)}};
+  of_parts.body->more[0] = compensation::ConvexPolygon::from(nose, 3);
+  EXPECT_THROW((void)to_px4(file, {.vehicle = &of_parts}), ConfigurationError) << "it knows one part";
+  EXPECT_THAT(to_c(file, {.vehicle = &of_parts}).text,
+              HasSubstr("more_corner_counts[0] = 3;\n  made.more_corners[0][0][0] = (kphi_real)0.2;"));
+  EXPECT_THAT(to_px4(file, {.vehicle = &hexa}).text, HasSubstr("CA_ROTOR_COUNT\t6"));
+  EXPECT_THAT(to_px4(file, {.vehicle = &hexa}).text, HasSubstr("KPHI_H5_X\t0.05\t"));
 }
 
 constexpr const char* kFlightInPx4 = R"(
