@@ -24,6 +24,7 @@
 #include "profiles/plan.hpp"
 #include "profiles/schema.hpp"
 #include "profiles/vehicle.hpp"
+#include "profiles/vehicle_drawing.hpp"
 #include "profiles/world.hpp"
 
 namespace kphi::commands {
@@ -95,24 +96,27 @@ std::string in_words(const Vehicle& vehicle) {
 }
 
 /// A shape with the occlusion of each rotor.
-std::string lines_of_shape(const std::string& name, const Vehicle& vehicle, const compensation::Airframe& airframe) {
+std::string lines_of_shape(const std::string& name, const Vehicle& vehicle) {
   const bool by_hubs = !vehicle.hubs.empty();
   std::string arms, occlusions;
   for (std::size_t i = 0; i < rotors_of(vehicle); ++i) {
-    Radians phi;
     if (by_hubs) {
       const compensation::HubPosition& hub = vehicle.hubs.at(name)[i];
       arms += fmt::format(" ({:.6g}, {:.6g})", hub.x.value(), hub.y.value());
-      phi = compensation::occlusion_beside_body(airframe, i, hub);
     } else {
-      const Radians angle = vehicle.shapes.at(name)[i];
-      arms += fmt::format(" {:.6g}", to_degrees(angle));
-      phi = compensation::occlusion_of_arm(airframe, i, angle);
+      arms += fmt::format(" {:.6g}", to_degrees(vehicle.shapes.at(name)[i]));
     }
-    occlusions += fmt::format(" {:.4g}", to_degrees(phi));
   }
+  for (const Radians phi : profiles::occlusions_of(vehicle, name))
+    occlusions += fmt::format(" {:.4g}", to_degrees(phi));
   return fmt::format("  shape {:<4} {} at{}{}, occluded by{}°\n", name, by_hubs ? "hubs" : "arms", arms,
                      by_hubs ? " m" : "°", occlusions);
+}
+
+std::string picture_of(const Vehicle& vehicle) {
+  std::string picture = "\nfrom above, the nose up; '#' of a disk is covered by the body ':'\n";
+  for (const std::string& line : profiles::shapes_in_characters(vehicle)) picture += line + "\n";
+  return picture;
 }
 
 std::string lines_of(const flight::Build& build, const flight::Gains& gains) {
@@ -146,17 +150,17 @@ std::string what_flies(const Vehicle& vehicle) {
 
 std::string lines_of(const Vehicle& vehicle) {
   std::string shapes;
-  const compensation::Airframe airframe = airframe_of(vehicle);
-  for (const std::string& name : shapes_of(vehicle)) shapes += lines_of_shape(name, vehicle, airframe);
+  for (const std::string& name : shapes_of(vehicle)) shapes += lines_of_shape(name, vehicle);
   return fmt::format(
       "  body       {}, {}, propeller radius {:g} m\n"
       "  rotors     {}{}\n"
       "  speeds     {:.6g} to {:.6g} RPM\n"
-      "  overlap    {}\n{}{}",
+      "  overlap    {}\n{}{}{}",
       in_words(vehicle),
       vehicle.hubs.empty() ? fmt::format("arms {:g} m", vehicle.arm_length.value()) : "hubs given for each shape",
       vehicle.propeller_radius.value(), rotors_of(vehicle), spins_of(vehicle), to_rpm(vehicle.speed_min),
-      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle));
+      to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle),
+      picture_of(vehicle));
 }
 
 std::string lines_of(const profiles::World& world) {

@@ -28,6 +28,7 @@
 #include "fit/uncertainty/analysis.hpp"
 #include "profiles/stand_drawing.hpp"
 #include "profiles/vehicle.hpp"
+#include "profiles/vehicle_drawing.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/run_reader.hpp"
@@ -74,10 +75,16 @@ std::string drawing_of(const FitInput& input) {
                               input.measured_by->occlusions_deg);
 }
 
+/// The number of the verdict where a vehicle flies, in words, and the vehicle as SVG; empty without one.
+struct OnVehicle {
+  std::string verdict, drawing;
+};
+
 /// `apart`: how the names of page and figures begin, apart from those of the campaign in the same folder.
-void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {}) {
+void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {},
+                  const OnVehicle& there = {}) {
   const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"));
-  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input)}));
+  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input), there.verdict, there.drawing}));
 }
 
 struct FitRequest {
@@ -207,12 +214,13 @@ std::optional<OneMore> one_more(const FitInput& input, const Fitted& fitted) {
                              input.provenance.bench.value_or(BenchUncertainty{}));
 }
 
-/// The number of the verdict where the vehicle flies.
-void print_in_flight(const FitRequest& request, const std::string& coefficients, const fs::path& file) {
-  if (request.vehicle.empty()) return;
+OnVehicle on_vehicle(const FitRequest& request, const std::string& coefficients, const fs::path& file) {
+  if (request.vehicle.empty()) return {};
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
-  if (const auto there = error_in_flight(compensation::parse_coefficients(coefficients, file.string()), vehicle))
-    fmt::print(stderr, "in flight     {}\n", words(*there, vehicle));
+  OnVehicle there{"", profiles::draw_shapes(vehicle)};
+  if (const auto error = error_in_flight(compensation::parse_coefficients(coefficients, file.string()), vehicle))
+    there.verdict = words(*error, vehicle);
+  return there;
 }
 
 void print_findings(const FitRequest& request, const FitInput& input, const Fitted& fitted, const fs::path& file) {
@@ -306,7 +314,8 @@ ExitCode run_fit(const FitRequest& request) {
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);
   print_findings(request, input, fitted, file);
-  print_in_flight(request, text, file);
+  const OnVehicle there = on_vehicle(request, text, file);
+  if (!there.verdict.empty()) fmt::print(stderr, "in flight     {}\n", there.verdict);
   if (input.provenance.origin != Origin::measured)
     fmt::print(stderr, "origin        {}\n",
                input.provenance.origin == Origin::simulated ? "SIMULATED, no propeller turned" : "unknown");
@@ -315,7 +324,7 @@ ExitCode run_fit(const FitRequest& request) {
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   std::vector<fs::path> written{file};
   if (!request.no_report) {
-    write_report(fitted, input, folder / (apart + "report.html"), apart);
+    write_report(fitted, input, folder / (apart + "report.html"), apart, there);
     written.push_back(folder / (apart + "report.html"));
   }
   record(input, folder, written);
@@ -440,8 +449,9 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   command.add_flag("--no-report", request.no_report, "write coefficients only");
   command.add_option("--fly-within", request.fly_within_percent,
                      "error of the thrust, percent, up to which the result is fit to fly (default 3; with care to 10)");
-  add_value(command, "--vehicle", "FILE", request.vehicle,
-            "vehicle file: also say by how much the thrust may be wrong for its φ and speeds")
+  add_value(
+      command, "--vehicle", "FILE", request.vehicle,
+      "vehicle file: also say by how much the thrust may be wrong for its φ and speeds, and draw it in the report")
       ->check(CLI::ExistingFile);
   command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
   command.add_flag("--json", request.json, "print the result as JSON");

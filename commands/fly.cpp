@@ -12,6 +12,7 @@
 #include "compensation/flight/tables.hpp"
 #include "compensation/flight/verdict.hpp"
 #include "fit/report/gnuplot.hpp"
+#include "profiles/vehicle_drawing.hpp"
 #include "profiles/world.hpp"
 
 namespace kphi::commands {
@@ -132,6 +133,7 @@ std::string write_figure(const fs::path& folder, const std::string& name, const 
 
 void write_out(const FlyRequest& request, const Flown& flown, const std::array<std::vector<TraceRow>, 9>& traces) {
   const fs::path folder(request.out);
+  write_output(folder / "vehicle.svg", profiles::draw_shapes(profiles::load_vehicle(request.vehicle)));
   std::string skipped;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     if (traces[i].empty()) continue;

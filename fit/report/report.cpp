@@ -108,6 +108,14 @@ std::string stand_section(const std::string& drawing) {
          "plate.</figcaption></figure>\n";
 }
 
+std::string vehicle_section(const Chapter& chapter) {
+  if (chapter.shapes.empty()) return {};
+  return html_heading("On the vehicle") + fmt::format("<p><b>{}.</b></p>\n", typeset(chapter.vehicle)) +
+         "<figure class=\"stand\">\n" + inline_svg(chapter.shapes, "vehicle-") +
+         "\n<figcaption>Its shapes from above, the nose up: arms, disks (dashed) with number, sense and φ, and what of "
+         "each disk the body covers.</figcaption></figure>\n";
+}
+
 std::string skipped_note(const Figures& figures) {
   if (figures.skipped.empty()) return {};
   return fmt::format("<p class=\"warning\">Figures skipped: {}.</p>\n", html_escaped(figures.skipped));
@@ -153,7 +161,7 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool
       origin_banner(provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
   html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
           coefficient_section(fitted);
-  if (alone) html += standard_section(fitted) + stand_section(chapter.drawing);
+  if (alone) html += standard_section(fitted) + stand_section(chapter.drawing) + vehicle_section(chapter);
   html += figure_section(figures, 1, shown, "How well the model holds", number);
   const std::string more = analysis_sections(analysis) + campaign_sections(identification, provenance);
   if (alone) html += more;

@@ -17,6 +17,8 @@ struct Chapter {
   Provenance provenance;
   Figures figures;
   std::string drawing{};  ///< SVG of the stand and its plates; empty: nobody described a stand
+  std::string vehicle{};  ///< what the verdict is on a vehicle, in words, and
+  std::string shapes{};   ///< SVG of its shapes; empty: nobody named one
 };
 
 /// The same arguments (and SVG files) give the same bytes.

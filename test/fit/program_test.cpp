@@ -213,9 +213,11 @@ TEST_F(FitProgram, ComparesALogWithAFittedCampaignOverTheSpeedsOfBoth) {
 TEST_F(FitProgram, SaysByHowMuchTheThrustMayBeWrongWhereTheVehicleFlies) {
   const std::string folder = steps("5x3"), drone = test::source_dir() + "/profiles/foldable_drone.yaml";
   const auto says = AllOf(HasSubstr("thrust within"), HasSubstr("where foldable_drone flies, φ up to 65°"));
-  const Answer fitted = kphi({"fit", folder, "--no-report", "--vehicle", drone});
+  const Answer fitted = kphi({"fit", folder, "--vehicle", drone});
   ASSERT_EQ(fitted.code, 0) << fitted.err;
   EXPECT_THAT(fitted.err, says);
+  EXPECT_THAT(results::read_text(folder + "/report.html"),
+              AllOf(says, HasSubstr("On the vehicle"), HasSubstr("41.3°")));
   EXPECT_THAT(kphi({"check", folder + "/coefficients.yaml", drone}).out, says);
   EXPECT_THAT(kphi({"compensate", "--coefficients", folder + "/coefficients.yaml", "--vehicle", drone}, "").err, says);
   const Answer exported = kphi({"export", folder, "--to", "c", "--vehicle", drone});

@@ -1,0 +1,84 @@
+#include "profiles/vehicle_drawing.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <pugixml.hpp>
+#include <string>
+
+#include "test/source_dir.hpp"
+
+namespace kphi::profiles {
+namespace vehicle_drawing_test {
+
+using testing::Each;
+using testing::HasSubstr;
+using testing::Not;
+using testing::SizeIs;
+
+Vehicle shipped(const char* name) { return load_vehicle(test::source_dir() + "/profiles/" + name); }
+
+std::size_t count(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+TEST(VehicleDrawing, IsWellFormedWithoutScriptsAndLinks) {
+  for (const char* file : {"foldable_drone.yaml", "foldable_hexa.yaml", "telescoping_quad.yaml"}) {
+    const std::string svg = draw_shapes(shipped(file));
+    pugi::xml_document document;
+    EXPECT_TRUE(document.load_string(svg.c_str())) << file;
+    EXPECT_THAT(svg, Not(HasSubstr("<script")));
+    EXPECT_THAT(svg, Not(HasSubstr("href")));
+  }
+}
+
+TEST(VehicleDrawing, HasADiskForEachRotorOfEachShapeAndACoveredPartWherePhiIsAboveZero) {
+  const Vehicle drone = shipped("foldable_drone.yaml");
+  const std::string svg = draw_shapes(drone);
+  EXPECT_EQ(count(svg, "class=\"disk\""), 4 * drone.shapes.size());
+  EXPECT_EQ(count(svg, "class=\"plate\""), 4u) << "O alone covers";
+  EXPECT_THAT(svg, HasSubstr("41.3°"));
+  EXPECT_THAT(svg, HasSubstr("2↺ 0°"));
+  EXPECT_THAT(occlusions_of(drone, "X"), Each(Radians(0)));
+}
+
+TEST(VehicleDrawing, ClipsEachCoveredPartByADiskOfItsOwn) {
+  const std::string svg = draw_shapes(shipped("foldable_drone.yaml"));
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_string(svg.c_str()));
+  for (const auto& part : document.select_nodes("//polygon[@clip-path]")) {
+    const std::string path = part.node().attribute("clip-path").value();
+    const std::string id = path.substr(5, path.size() - 6);
+    EXPECT_THAT(document.select_nodes(("//clipPath[@id='" + id + "']").c_str()), SizeIs(1)) << path;
+  }
+}
+
+TEST(VehicleDrawing, InCharactersCoversAsMuchOfTheDisksAsTheGeometry) {
+  const Vehicle drone = shipped("foldable_drone.yaml");
+  const auto lines = shapes_in_characters(drone);
+  std::string all;
+  for (const std::string& line : lines) {
+    EXPECT_LE(line.size(), 78u);
+    all += line + "\n";
+  }
+  for (const char hub : {'1', '2', '3', '4'}) EXPECT_EQ(std::ranges::count(all, hub), 4) << hub << ", once a shape";
+  EXPECT_GT(std::ranges::count(all, '#'), 0);
+  const Vehicle hexa = shipped("foldable_hexa.yaml");
+  EXPECT_GE(std::ranges::count(shapes_in_characters(hexa).front(), '.'), 0);
+}
+
+TEST(VehicleDrawing, PutsTheNoseUpAndTheLeftToTheLeft) {
+  const auto lines = shapes_in_characters(shipped("telescoping_quad.yaml"));  // hub 1 is ahead and on the left
+  const auto row_of = [&](char hub) {
+    return std::ranges::find_if(lines, [hub](const std::string& line) { return line.find(hub) != std::string::npos; }) -
+           lines.begin();
+  };
+  const auto column_of = [&](char hub) { return lines.at(static_cast<std::size_t>(row_of(hub))).find(hub); };
+  EXPECT_LT(row_of('1'), row_of('2'));
+  EXPECT_LT(column_of('1'), column_of('4'));
+}
+
+}  // namespace vehicle_drawing_test
+}  // namespace kphi::profiles
