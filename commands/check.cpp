@@ -17,6 +17,7 @@
 #include "compensation/occlusion.hpp"
 #include "daq/campaign/dry_run.hpp"
 #include "drivers/sim/input_files.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/logs/layout.hpp"
 #include "profiles/answers.hpp"
@@ -45,6 +46,8 @@ struct CheckedFile {
   std::optional<Campaign> campaign;
   std::optional<BenchConfig> bench;
   std::optional<Answers> answers;
+  std::optional<Vehicle> vehicle;
+  std::optional<compensation::Coefficients> coefficients;
 };
 
 /// On a bench with the usual rate.
@@ -230,7 +233,8 @@ const std::vector<Kind>& kinds() {
       ours(FileKind::bench,
            [](Text text, File file) { return lines_of(file.bench.emplace(parse_bench(text, file.path))); },
            {"netbox", "iq"}),
-      ours(FileKind::vehicle, [](Text text, File file) { return lines_of(parse_vehicle(text, file.path)); },
+      ours(FileKind::vehicle,
+           [](Text text, File file) { return lines_of(file.vehicle.emplace(parse_vehicle(text, file.path))); },
            {"shapes_deg", "half_side_m"}),
       ours(FileKind::answers,
            [](Text text, File file) { return lines_of(file.answers.emplace(parse_answers(text, file.path))); },
@@ -241,7 +245,8 @@ const std::vector<Kind>& kinds() {
            {"header_line"}),
       {"coefficients", compensation::kCoefficientFormat,
        [](Text, File file) {
-         return lines_of(load_standing_coefficients(file.path, compensation::Need::thrust_coefficient));
+         return lines_of(
+             file.coefficients.emplace(load_standing_coefficients(file.path, compensation::Need::thrust_coefficient)));
        }},
       {"fault script", "kphi-faults/1",
        [](Text text, File file) { return lines_of(sim::parse_faults(text, file.path)); }},
@@ -317,13 +322,16 @@ CheckedFile check_alone(const std::string& path) {
   return file;
 }
 
-/// Every campaign against every bench, and all answers against every campaign.
+/// Every campaign against every bench, all answers against every campaign, and coefficients where each vehicle flies.
 void check_together(std::vector<CheckedFile>& files) {
   for (CheckedFile& file : files) {
     for (const CheckedFile& other : files) {
       if (file.campaign && other.bench) attempt(file, [&] { require_within(*file.campaign, *other.bench); });
       if (file.answers && other.campaign)
         attempt(file, [&] { require_mountings(*file.answers, plan_of(*other.campaign)); });
+      if (!file.coefficients || !other.vehicle) continue;
+      if (const auto there = fit::error_in_flight(*file.coefficients, *other.vehicle))
+        file.summary += "  in flight  " + fit::words(*there, *other.vehicle) + "\n";
     }
   }
 }
@@ -362,7 +370,8 @@ void add_check(CLI::App& program, ExitCode& exit_code) {
       "check campaign, bench, vehicle, answers, layout and coefficient files, fault scripts and simulated motors",
       "kphi check my_bench.yaml my_campaign.yaml", check);
   add_argument(command, "FILE", options.paths,
-               "files; campaigns are also checked against the benches and answers among them");
+               "files; campaigns are also checked against the benches and answers among them, coefficients against the "
+               "vehicles");
   command.add_flag("--json", options.json, "print one JSON object per file on a line of its own");
 }
 

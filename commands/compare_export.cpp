@@ -14,6 +14,7 @@
 #include "commands/outputs.hpp"
 #include "compensation/file/plausibility.hpp"
 #include "compensation/units.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/export/run_export.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/propellers/claims.hpp"
@@ -23,6 +24,8 @@
 #include "fit/uncertainty/readiness.hpp"
 #include "profiles/vehicle.hpp"
 #include "results/campaign_folder.hpp"
+#include "results/checksums.hpp"
+#include "results/file_layer.hpp"
 #include "results/run_reader.hpp"
 
 namespace kphi::commands {
@@ -124,6 +127,8 @@ Comparison compare_logs(const std::vector<FitInput>& logs, const CompareRequest&
   ComparedLogs compared = over_common_speeds(logs, request.results);
   Comparison comparison = compare(std::move(compared.results.front()), std::move(compared.results.back()));
   if (!compared.remark.empty()) comparison.remarks.push_back(compared.remark);
+  if (std::ranges::any_of(logs, [](const FitInput& log) { return log.record.has_value(); }))
+    comparison.remarks.push_back("of the campaign its runs at 0° alone: the log has no occlusions");
   return comparison;
 }
 
@@ -138,6 +143,28 @@ std::vector<FitInput> logs_of(const std::vector<std::string>& paths) {
   return logs;
 }
 
+/// The runs of a fitted campaign at 0°, to be fitted as its file says; nullopt if its steps are not beside that.
+std::optional<FitInput> campaign_at_zero(const std::string& path) {
+  const fs::path place(path), folder = fs::is_directory(place) ? place : place.parent_path();
+  const fs::path file = coefficient_file_of(path);
+  if (!fs::exists(folder / "steps.csv") || file.filename() != "coefficients.yaml") return std::nullopt;
+  results::require_seal(results::read_text(file), file.string());
+  FitInput campaign = load_input(folder.empty() ? "." : folder.string());
+  if (!campaign.table.empty()) return std::nullopt;
+  campaign.record = read_recorded_fit(file.string());
+  std::erase_if(campaign.steps, [](const auto& step) { return step.occlusion_deg > 0; });
+  return campaign;
+}
+
+/// Two logs, or a log and a campaign's runs at 0°; empty if neither is a log.
+std::vector<FitInput> two_logs_of(const std::vector<std::string>& paths) {
+  auto a = log_of(paths.front()), b = log_of(paths.back());
+  if (!a && !b) return {};
+  if (!a) a = campaign_at_zero(paths.front());
+  if (!b) b = campaign_at_zero(paths.back());
+  return a && b ? std::vector{*a, *b} : std::vector<FitInput>();
+}
+
 /// K_T of several logs side by side.
 ExitCode compare_many(const std::vector<FitInput>& logs, const CompareRequest& request) {
   if (!request.expect.empty()) throw ConfigurationError("--expect needs exactly two results: it is their verdict");
@@ -148,8 +175,9 @@ ExitCode compare_many(const std::vector<FitInput>& logs, const CompareRequest& r
 }
 
 ComparedResult loaded(const std::optional<FitInput>& log, const std::string& path) {
-  if (!log) return load_result(path);
-  return result_of_log(fitted_log(*log), log->provenance.origin, path);
+  if (log) return result_of_log(fitted_log(*log), log->provenance.origin, path);
+  refuse_other_input(path, InputKind::coefficients);
+  return load_result(path);
 }
 
 ExitCode compare_truth(const CompareRequest& request) {
@@ -171,7 +199,7 @@ ExitCode run_compare(const CompareRequest& request) {
   if (request.results.size() > 2 && !family)
     if (const auto logs = logs_of(request.results); !logs.empty()) return compare_many(logs, request);
   if (request.results.size() > 2 || family) return compare_family(request);
-  const auto logs = logs_of(request.results);
+  const auto logs = two_logs_of(request.results);
   const Comparison comparison = !logs.empty()
                                     ? compare_logs(logs, request)
                                     : compare(loaded(log_of(request.results.front()), request.results.front()),
@@ -209,16 +237,17 @@ void export_run(const ExportRequest& request) {
 }
 
 void export_coefficients(const ExportRequest& request) {
-  const compensation::Coefficients coefficients =
+  compensation::Coefficients coefficients =
       load_standing_coefficients(coefficient_file_of(request.file).string(), compensation::Need::thrust_coefficient);
-  print_standing(coefficients);
-  const auto verdict = readiness_named(coefficients.verdict);
-  if (verdict == Readiness::not_yet && !request.accept)
-    throw DataRejected(fmt::format("{}: {}; nothing is exported; --accept does it all the same", coefficients.path,
-                                   verdict_words(coefficients)));
   ExportOptions options = request.options;
   std::optional<profiles::Vehicle> vehicle;
   if (!request.vehicle.empty()) options.vehicle = &vehicle.emplace(profiles::load_vehicle(request.vehicle));
+  const auto verdict = print_standing(coefficients, options.vehicle);
+  if (verdict == Readiness::not_yet && !request.accept)
+    throw DataRejected(fmt::format("{}: {}; nothing is exported; --accept does it all the same", coefficients.path,
+                                   fit::words(*verdict)));
+  if (vehicle)
+    if (const auto there = error_in_flight(coefficients, *vehicle)) judge_for(coefficients, *there, *vehicle);
   for (const Target& target : targets()) {
     if (request.to != target.name) continue;
     const Export result = target.write(coefficients, options);
@@ -279,7 +308,10 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
     names.emplace_back(target.name);
     footer += fmt::format("  {:<11} {}\n", target.name, target.what);
   }
-  command.add_option("--to", request.to, "target, see below")->required()->check(CLI::IsMember(names));
+  command.add_option("--to", request.to, "target, see below")
+      ->required()
+      ->check(CLI::IsMember(names).description(""))
+      ->type_name("TARGET");
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   add_value(command, "--vehicle", "FILE", request.vehicle,
             "vehicle file, for targets that compute k from arm angles (c, px4, ros2, ardupilot)")

@@ -13,6 +13,7 @@
 #include "commands/outputs.hpp"
 #include "compensation/units.hpp"
 #include "fit/coefficients/coefficients.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/model/table_line.hpp"
 #include "fit/plan/outlook.hpp"
 #include "fit/propellers/claims.hpp"
@@ -26,6 +27,7 @@
 #include "fit/signal/dynamics.hpp"
 #include "fit/uncertainty/analysis.hpp"
 #include "profiles/stand_drawing.hpp"
+#include "profiles/vehicle.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/run_reader.hpp"
@@ -92,6 +94,7 @@ struct FitRequest {
   std::optional<double> fly_within_percent;
   bool accept = false;
   bool json = false;
+  std::string vehicle;
 };
 
 /// "A:B" in RPM; either end may be left out.
@@ -204,6 +207,14 @@ std::optional<OneMore> one_more(const FitInput& input, const Fitted& fitted) {
                              input.provenance.bench.value_or(BenchUncertainty{}));
 }
 
+/// The number of the verdict where the vehicle flies.
+void print_in_flight(const FitRequest& request, const std::string& coefficients, const fs::path& file) {
+  if (request.vehicle.empty()) return;
+  const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
+  if (const auto there = error_in_flight(compensation::parse_coefficients(coefficients, file.string()), vehicle))
+    fmt::print(stderr, "in flight     {}\n", words(*there, vehicle));
+}
+
 void print_findings(const FitRequest& request, const FitInput& input, const Fitted& fitted, const fs::path& file) {
   const Json raw = request.raw ? raw_json(input) : Json();
   std::optional<FamilyFindings> family;
@@ -220,11 +231,6 @@ void print_findings(const FitRequest& request, const FitInput& input, const Fitt
   if (const auto more = one_more(input, fitted)) json["one_more_repetition"] = to_json(*more);
   if (!raw.is_null()) json["raw"] = raw;
   print_json(json);
-}
-
-/// Half of the 95 % interval; NaN: unknown.
-double expanded(const Estimate& estimate) {
-  return std::isnan(estimate.u) ? estimate.u : coverage_factor(estimate.freedom) * estimate.u;
 }
 
 std::string text_of(const char* name, const Estimate& estimate, const char* per) {
@@ -300,6 +306,7 @@ ExitCode run_fit(const FitRequest& request) {
   const std::string text = format_coefficients(fitted, input.provenance);
   write_output(file, text);
   print_findings(request, input, fitted, file);
+  print_in_flight(request, text, file);
   if (input.provenance.origin != Origin::measured)
     fmt::print(stderr, "origin        {}\n",
                input.provenance.origin == Origin::simulated ? "SIMULATED, no propeller turned" : "unknown");
@@ -433,6 +440,9 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   command.add_flag("--no-report", request.no_report, "write coefficients only");
   command.add_option("--fly-within", request.fly_within_percent,
                      "error of the thrust, percent, up to which the result is fit to fly (default 3; with care to 10)");
+  add_value(command, "--vehicle", "FILE", request.vehicle,
+            "vehicle file: also say by how much the thrust may be wrong for its φ and speeds")
+      ->check(CLI::ExistingFile);
   command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
   command.add_flag("--json", request.json, "print the result as JSON");
 }

@@ -186,6 +186,7 @@ ExitCode run_import(const ImportRequest& request) {
   int spoilt = 0;
   for (const std::string& path : request.files) {
     try {
+      refuse_other_input(path, InputKind::table);
       for (const ImportedLog& log : import_file(path, request, options, talk)) {
         group.push_back(log.coefficient);
         spoilt += log.means_nothing ? 1 : 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -13,6 +14,7 @@
 #include "commands/commands.hpp"
 #include "compensation/file/coefficient_file.hpp"
 #include "compensation/file/plausibility.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/export/targets.hpp"
 #include "fit/logs/import_table.hpp"
 #include "fit/model/averaged_runs.hpp"
@@ -20,6 +22,7 @@
 #include "fit/uncertainty/readiness.hpp"
 #include "profiles/bench_config.hpp"
 #include "profiles/campaign.hpp"
+#include "profiles/schema.hpp"
 #include "results/campaign_folder.hpp"
 #include "results/checksums.hpp"
 #include "results/digest.hpp"
@@ -172,7 +175,47 @@ void take_import(const fs::path& file, FitInput& input) {
   }
 }
 
+/// Its first bytes.
+std::string beginning_of(const fs::path& path) {
+  constexpr std::size_t kLooked = 4096;
+  std::string text(kLooked, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(text.data(), kLooked);
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  return "\n" + text;
+}
+
+/// Of a file that a person writes, given as a result.
+const char* next_move_for(profiles::FileKind kind) {
+  switch (kind) {
+    case profiles::FileKind::campaign:
+      return "`kphi run` measures it; then name the folder that it prints";
+    case profiles::FileKind::bench:
+      return "`kphi devices --bench` asks its devices";
+    case profiles::FileKind::vehicle:
+      return "give it with --vehicle";
+    case profiles::FileKind::answers:
+      return "give it with --answers";
+    case profiles::FileKind::world:
+      return "give it with --world";
+    case profiles::FileKind::layout:
+      return "give it with --layout";
+  }
+  return "";
+}
+
+/// By the names of its columns neither steps nor k.
+void refuse_a_log(const std::string& text, const fs::path& path) {
+  const std::string_view names = std::string_view(text).substr(0, text.find('\n'));
+  if (names.find("speed_rad_s") != std::string_view::npos || names.find("phi_deg") != std::string_view::npos) return;
+  throw ConfigurationError(
+      fmt::format("{0}: neither steps of kphi nor a table of k (no column speed_rad_s or phi_deg); a log of a stand is "
+                  "imported first: kphi import {0} --out DIR",
+                  path.string()));
+}
+
 FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
+  refuse_other_input(path.string(), InputKind::table);
   FitInput input;
   input.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   input.provenance.campaign = path.stem().string();
@@ -181,6 +224,7 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
   if (is_k_table(text)) {
     input.table = averaged_table(read_k_table(text, path.string(), unit_of_k), path);
   } else {
+    refuse_a_log(text, path);
     input.steps = results::parse_steps(text, path.string());
     take_import(input.folder / "import.json", input);
     input.provenance.origin = results::origin_of(input.steps);
@@ -194,6 +238,21 @@ FitInput file_input(const fs::path& path, const std::string& unit_of_k) {
 }
 
 }  // namespace
+
+void refuse_other_input(const std::string& path, InputKind wanted) {
+  if (!fs::is_regular_file(path)) return;
+  const std::string begin = beginning_of(path);
+  const auto refuse = [&](const std::string& mark, const std::string& word, const char* next) {
+    if (begin.find("\n" + mark) == std::string::npos) return;
+    throw ConfigurationError(fmt::format("{}: this is a {} file; {}", path, word, next));
+  };
+  for (const profiles::FileKindInfo& kind : profiles::kFileKinds)
+    refuse(fmt::format("format: {}", kind.format), kind.word, next_move_for(kind.kind));
+  if (wanted != InputKind::run)
+    refuse("\x89HDF", "run", "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in");
+  if (wanted != InputKind::coefficients)
+    refuse("format: kphi-coefficients/", "coefficient", "`kphi export`, `kphi compare` and `kphi compensate` take it");
+}
 
 FitInput load_input(const std::string& path, const std::string& unit_of_k) {
   const bool campaign = fs::exists(fs::path(path) / "journal.jsonl") || fs::exists(fs::path(path) / "runs");
@@ -220,9 +279,16 @@ AnalysisOptions analysis_options(const FitInput& input, const Identification& id
   return options;
 }
 
-Fitted fitted_log(const FitInput& input, const SpeedRange& range) {
-  Identification K_T = identify(input.steps, {.speed_range = range, .mounted_once = input.mounted_once});
-  Analysis analysis = analyse(K_T, analysis_options(input, K_T));
+Fitted fitted_log(const FitInput& input, const std::optional<SpeedRange>& range) {
+  IdentificationOptions options{.mounted_once = input.mounted_once};
+  if (input.record) options = input.record->options;
+  if (range) options.at_speed_rad_s.reset();  // it may lie outside
+  options.speed_range = range.value_or(options.speed_range);
+  options.curve = {};
+  Identification K_T = identify(input.steps, options);
+  AnalysisOptions judged = analysis_options(input, K_T);
+  if (input.record && input.record->bench) judged.bench = *input.record->bench;
+  Analysis analysis = analyse(K_T, judged);
   return {std::move(K_T), std::move(analysis)};
 }
 
@@ -279,6 +345,7 @@ std::vector<std::string> unlike_journal(const compensation::Coefficients& file, 
 }
 
 compensation::Coefficients load_standing_coefficients(const std::string& path, compensation::Need need) {
+  refuse_other_input(path, InputKind::coefficients);
   compensation::Coefficients file = load_sealed_coefficients(path, need);
   const fs::path parent = fs::path(path).parent_path();
   if (!fs::exists(parent / "journal.jsonl")) return file;
@@ -295,12 +362,18 @@ compensation::Coefficients load_sealed_coefficients(const std::string& path, com
   return file;
 }
 
-void print_standing(const compensation::Coefficients& file) {
+std::optional<Readiness> print_standing(const compensation::Coefficients& file, const profiles::Vehicle* vehicle) {
   if (origin_named(file.origin) != Origin::measured)
     fmt::print(stderr, "origin        {}: {}\n", file.path, origin_words(file));
-  if (const auto verdict = readiness_named(file.verdict); !verdict || verdict != Readiness::fit_to_fly)
+  auto verdict = readiness_named(file.verdict);
+  if (!verdict || verdict != Readiness::fit_to_fly)
     fmt::print(stderr, "verdict       {}: {}\n", file.path, verdict_words(file));
+  if (const auto there = vehicle != nullptr ? error_in_flight(file, *vehicle) : std::nullopt) {
+    fmt::print(stderr, "in flight     {}: {}\n", file.path, words(*there, *vehicle));
+    verdict = there->readiness;
+  }
   print_doubts(file.path, compensation::doubts_of(file));
+  return verdict;
 }
 
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts) {
@@ -319,9 +392,9 @@ compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vecto
   for (const std::string& path : coefficients) {
     if (curves.contains(path)) continue;
     const compensation::Coefficients file = load_standing_coefficients(path);
-    print_standing(file);
     const auto mismatch = compensation::overlap_mismatch(file.curve.overlap(), path, vehicle.overlap, vehicle.path);
     if (mismatch) throw ConfigurationError(*mismatch);
+    print_standing(file, &vehicle);
     curves.emplace(path, file.curve);
   }
   const auto of = [&](std::size_t rotor) { return curves.at(coefficients[coefficients.size() == 1 ? 0 : rotor]); };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -32,21 +33,26 @@ struct FitInput {
   std::filesystem::path folder;                     ///< where the outputs go
   bool campaign = false;                            ///< `folder` is a campaign folder
   bool mounted_once = false;                        ///< one mounting for all repetitions of an occlusion
-  double u_speed = 0;                     ///< of a log: relative, of all speeds together, by the steps they come in
-  std::optional<double> u_calibration{};  ///< relative, of the load cell, by the weighing in provenance.cell_weighed
+  double u_speed = 0;                        ///< of a log: relative, of all speeds together, by the steps they come in
+  std::optional<double> u_calibration{};     ///< relative, of the load cell, by the weighing in provenance.cell_weighed
+  std::optional<fit::RecordedFit> record{};  ///< of a campaign's runs at 0° beside a log: how they are fitted
 };
 
 /// From a campaign folder, a folder with a steps.csv, a steps.csv or a table of k. Throws ConfigurationError, naming
 /// the next move, if there are neither steps nor coefficients.
 [[nodiscard]] FitInput load_input(const std::string& path, const std::string& unit_of_k = {});
 
+/// What a verb takes, of the kinds of files that kphi knows by their first bytes.
+enum class InputKind : std::uint8_t { table, run, coefficients };
+/// Throws ConfigurationError, with the command that takes it, if `path` is a file of another kind that it knows.
+void refuse_other_input(const std::string& path, InputKind wanted);
+
 /// What the campaign's own files know of errors: the clock's from the bench file, the air's from its instruments, the
 /// load cell's from a weighing of its bench beside it.
 [[nodiscard]] fit::AnalysisOptions analysis_options(const FitInput& input, const fit::Identification& identification);
 
-/// A log: steps without occlusion, as `kphi fit` fits them, over `range`.
-[[nodiscard]] fit::Fitted fitted_log(const FitInput& input,
-                                     const fit::SpeedRange& range = fit::IdentificationOptions().speed_range);
+/// A log: steps without occlusion, as `kphi fit` fits them; `range` instead of the usual one, or the record's.
+[[nodiscard]] fit::Fitted fitted_log(const FitInput& input, const std::optional<fit::SpeedRange>& range = {});
 
 /// A folder with steps and coefficients, fitted and judged again as its coefficients.yaml says.
 struct FittedFolder {
@@ -70,9 +76,11 @@ void add_flight_files(CLI::App& command, std::vector<std::string>& coefficients,
 /// A line for each run behind them that the journal does not have so.
 [[nodiscard]] std::vector<std::string> unlike_journal(const compensation::Coefficients& file,
                                                       const results::CampaignState& state);
-/// Says on stderr, one line each: that they were not measured, that they are not fit to fly, and what of them is unlike
-/// any propeller or stand.
-void print_standing(const compensation::Coefficients& file);
+/// Says on stderr, one line each: that they were not measured, that they are not fit to fly, by how much the thrust may
+/// be wrong where the vehicle flies, if there is one, and what of them is unlike any propeller or stand. Returns
+/// whether to fly on them, there or anywhere; nullopt: the file does not tell.
+std::optional<fit::Readiness> print_standing(const compensation::Coefficients& file,
+                                             const profiles::Vehicle* vehicle = nullptr);
 /// The last of these alone.
 void print_doubts(const std::string& path, const std::vector<std::string>& doubts);
 

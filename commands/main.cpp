@@ -24,16 +24,19 @@ namespace {
 using kphi::ExitCode;
 
 constexpr const char* kFooter =
-    "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found, 4 safety stop,\n"
-    "            5 data rejected, 6 bench or folder in use, 130 interrupted after a controlled spin-down.\n"
-    "Data goes to stdout, messages to stderr. Data that cannot be written (closed pipe, full disk) is a failure (1);\n"
-    "a run continues, and its exit code says how the run ended. NO_COLOR is honoured.\n\n"
+    "Exit codes: 0 ok, 1 failure, 2 usage or configuration, 3 device not found,\n"
+    "            4 safety stop, 5 data rejected, 6 bench or folder in use,\n"
+    "            130 interrupted after a controlled spin-down.\n"
+    "Data goes to stdout, messages to stderr. Data that cannot be written (closed\n"
+    "pipe, full disk) is a failure (1); a run continues, and its exit code says how\n"
+    "the run ended. NO_COLOR is honoured.\n\n"
     "Without hardware:  kphi init\n"
     "                   kphi sim bench.yaml &\n"
     "                   kphi run campaign.yaml --bench bench.yaml --yes\n"
     "                   kphi fit results/<the folder it printed>\n"
     "                   kphi init vehicle\n"
-    "                   kphi fly --coefficients results/<the folder>/coefficients.yaml --vehicle vehicle.yaml";
+    "                   kphi fly --vehicle vehicle.yaml \\\n"
+    "                            --coefficients results/<folder>/coefficients.yaml";
 
 /// A file that is opened later must not get the number of a closed standard stream: messages would go into the file.
 /// The replacement can be neither read nor written.
@@ -94,6 +97,7 @@ int end(ExitCode exit_code) {
 
 ExitCode run(int argc, char** argv) {
   CLI::App program("kphi: propeller test stand to k(φ) to flight", "kphi");
+  program.formatter(kphi::commands::narrow_help());
   program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
   program.require_subcommand(1);
   ExitCode exit_code = ExitCode::ok;

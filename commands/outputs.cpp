@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 /// By what kphi's files differ from those of others, and from each other.
 constexpr std::array kMarks{
     std::string_view("format: kphi-coefficients/"), std::string_view("<title>k(φ) of "),
-    std::string_view("\"kphi-import/1\""),
+    std::string_view("<title>K_T of "), std::string_view("\"kphi-import/1\""),
     // kphi export
     std::string_view("fitted by kphi "), std::string_view("thrust_map"), std::string_view("CA_ROTOR0_"),
     std::string_view("<sdf "), std::string_view("ros__parameters"), std::string_view("#pragma once"),

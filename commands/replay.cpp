@@ -157,6 +157,7 @@ void print(const Replay& replay, const ReplayRequest& asked) {
 }
 
 ExitCode run_replay(const ReplayRequest& asked) {
+  refuse_other_input(asked.path, InputKind::run);
   const bool is_campaign = std::filesystem::is_directory(asked.path);
   const Replay result = is_campaign ? replay_campaign(CampaignFolder::open(asked.path)) : replay_run(asked.path);
   print(result, asked);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <sstream>
 
 #include "profiles/schema.hpp"
 
@@ -48,7 +49,77 @@ std::string what_is_wrong(const CLI::App& verb, const CLI::ParseError& error, co
   return said;
 }
 
+constexpr std::size_t kColumns = 80, kWords = 28;  // a line; where the words of an option begin
+
+/// Characters, not bytes.
+std::size_t width_of(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+}
+
+/// `words` after `begin`, which is `used` wide; further lines are indented.
+std::string wrapped(std::string line, std::size_t used, const std::string& words, std::size_t indent,
+                    std::size_t columns = kColumns) {
+  bool is_first = true;
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    const std::string word = words.substr(at, end - at);
+    at = end + 1;
+    if (!is_first && used + 1 + width_of(word) > columns) {
+      line += "\n" + std::string(indent, ' ');
+      used = indent;
+      is_first = true;
+    }
+    line += (is_first ? "" : " ") + word;
+    used += width_of(word) + !is_first;
+    is_first = false;
+  }
+  return line + "\n";
+}
+
+class NarrowHelp : public CLI::Formatter {
+ public:
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    return row("  " + make_option_name(option, is_positional) + make_option_opts(option), make_option_desc(option));
+  }
+  std::string make_subcommand(const CLI::App* verb) const override {
+    return row(verb->get_display_name(true), verb->get_description());
+  }
+  std::string make_description(const CLI::App* verb) const override {
+    return wrapped("", 0, verb->get_description(), 0);
+  }
+  std::string make_footer(const CLI::App* verb) const override {
+    std::istringstream lines(verb->get_footer());
+    std::string text;
+    for (std::string line; std::getline(lines, line);) text += footer_line(line);
+    return text;
+  }
+
+ private:
+  /// A command continues after a backslash, a row of a table under its second column.
+  static std::string footer_line(const std::string& line) {
+    constexpr std::size_t kContinued = 4;
+    if (width_of(line) <= kColumns) return line + "\n";
+    const bool is_command = line.starts_with("kphi ");
+    const std::size_t begin = std::min(line.find_first_not_of(' '), line.size()), gap = line.find("  ", begin);
+    const std::size_t column = gap == std::string::npos ? begin : line.find_first_not_of(' ', gap);
+    const std::size_t indent = is_command ? kContinued : column;
+    std::string text = wrapped(line.substr(0, column), width_of(line.substr(0, column)), line.substr(column), indent,
+                               is_command ? kColumns - 2 : kColumns);  // two for the backslash
+    for (std::size_t at = 0; is_command && (at = text.find('\n', at)) + 1 < text.size(); at += 3)
+      text.insert(at, " \\");
+    return text;
+  }
+  static std::string row(const std::string& name, const std::string& words) {
+    const std::size_t width = width_of(name);
+    const std::string gap = width + 2 > kWords ? "\n" + std::string(kWords, ' ') : std::string(kWords - width, ' ');
+    return wrapped(name + gap, kWords, words, kWords);
+  }
+};
+
 }  // namespace
+
+std::shared_ptr<CLI::FormatterBase> narrow_help() { return std::make_shared<NarrowHelp>(); }
 
 void require_finite_numbers(CLI::App& program) {
   for (CLI::Option* option : program.get_options()) {

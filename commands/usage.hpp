@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,9 @@ namespace kphi::commands {
 /// The command line as `program` parses it: without the program's name, `help VERB` as `VERB --help`, nothing as
 /// `--help`, `-v` as `--version`.
 [[nodiscard]] std::vector<std::string> understood(int argc, const char* const* argv);
+
+/// Help within 80 columns. Set it before verbs are added: they take it from the program.
+[[nodiscard]] std::shared_ptr<CLI::FormatterBase> narrow_help();
 
 /// No option or argument of `program` and its verbs takes a number that is not finite: NaN is within every range. A
 /// file of such a name is ./nan.

@@ -1,6 +1,6 @@
 #include "compensation/flown_curves.hpp"
 
-#include <cstring>
+#include <cmath>
 
 #include "compensation/strict_math.hpp"
 
@@ -10,11 +10,10 @@ bool FlownCurves::place(const KnotList& knots, Piece& piece) noexcept {
   // The first place where they are, or where they may go on beyond the last that is known.
   std::size_t first = 0, same = 0;
   while (same < knots.count && first + same < kMostKnots) {
-    const Knot asked = knots[same];
-    const FlownKnot knot{asked.occlusion, asked.value};
+    const Knot knot = knots[same];
     FlownKnot& here = knots_[first + same];
-    if (first + same >= knot_count_) here = knot;
-    if (std::memcmp(&here, &knot, sizeof knot) == 0) {
+    if (first + same >= knot_count_) here = {knot.occlusion, knot.value};
+    if (!(std::fabs((here.occlusion - knot.occlusion).value()) + std::fabs(here.value - knot.value) > 0)) {
       ++same;
     } else {
       ++first;

@@ -46,7 +46,7 @@ class FlownCurves {
     Radians occlusion;
     Real value;
   };
-  /// Lets `piece` name these knots, which are stored once for all curves that have them; false if there is no room.
+  /// Stores these knots, once for all curves that have them, and points `piece` at them; false: no room left.
   bool place(const KnotList& knots, Piece& piece) noexcept;
 
   Rotors<Curve> curves_;

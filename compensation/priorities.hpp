@@ -51,11 +51,11 @@ class WithinLimits {
 
   struct Sizes {
     Real reach;    ///< the largest of all x and y [m]
-    Real yaw_arm;  ///< about the largest of the arms of set_yaw() [m]; 0: there is no yaw
+    Real yaw_arm;  ///< about the largest arm passed to set_yaw() [m]; 0: no yaw
   };
 
   /// Begins at `start`, cut to the limits, which must live as long as this and are narrowed by it. The rotors are at
-  /// (`x`, `y`) [m], roll = y·f, pitch = −x·f. There is no yaw before set_yaw().
+  /// (`x`, `y`) [m], roll = y·f, pitch = −x·f. Yaw counts from set_yaw() on.
   WithinLimits(Limits& limits, const Row& start, const Row& x, const Row& y, Sizes sizes) noexcept;
 
   /// (roll, pitch) come as near to these [N m] as can be, in the sum of squares, and stay there.

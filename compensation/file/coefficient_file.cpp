@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -331,9 +332,31 @@ Coefficients::Row read_row(const Value& map, double scale) {
 }
 
 Coefficients::Torque read_torque(const Value& map) {
-  const Coefficients::Torque row{from_degrees(map.at("phi_deg").number()), map.at("k_q").number(), map.number_at("u")};
+  const Coefficients::Torque row{from_degrees(map.at("phi_deg").number()), map.at("k_q").number(),
+                                 read_uncertainty(map, 1), map.number_at("drag_per_thrust_m"),
+                                 map.number_at("drag_per_thrust_expanded_95_m")};
   if (!(row.k_q > 0)) map.at("k_q").refuse("a drag torque must be positive", kFitAgain);
   return row;
+}
+
+/// Of rows that all have a share, not below 0, for each column; ascending.
+Coefficients::ThrustErrorWithin read_error_within(const Value& map) {
+  Coefficients::ThrustErrorWithin within;
+  within.reference_rad_s = from_rpm(map.at("reference_rpm").number()).value();
+  for (const Value& off : map.list("speed_off_rpm")) within.off_rad_s.push_back(from_rpm(off.number()).value());
+  for (const Value& line : map.list("rows")) {
+    const std::vector<Value> numbers = line.items();
+    if (numbers.size() != within.off_rad_s.size() + 1 || numbers.size() < 2)
+      line.refuse("a row needs phi_deg and a share for each speed_off_rpm", kFitAgain);
+    Coefficients::ThrustErrorWithin::Row row{numbers.front().number(), {}};
+    for (std::size_t i = 1; i < numbers.size(); ++i) row.shares.push_back(numbers[i].number());
+    if (!within.rows.empty() && !(row.phi_deg > within.rows.back().phi_deg))
+      line.refuse("the rows do not ascend", kFitAgain);
+    within.rows.push_back(std::move(row));
+  }
+  if (!std::is_sorted(within.off_rad_s.begin(), within.off_rad_s.end()))
+    map.at("speed_off_rpm").refuse("`speed_off_rpm` does not ascend", kFitAgain);
+  return within;
 }
 
 void read_propeller(const Value& map, Coefficients::Propeller& into) {
@@ -452,6 +475,9 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
       coefficients.thrust_error = {error.number_at("share_95"), error.number_at("phi_deg"),
                                    error.number_at("fit_to_fly"), error.number_at("with_care")};
     }
+    coefficients.doubts_allow = uncertainty.text_at("doubts_allow");
+    if (uncertainty.find("thrust_error_within"))
+      coefficients.thrust_error_within = read_error_within(uncertainty.map_at("thrust_error_within"));
   }
   return coefficients;
 }

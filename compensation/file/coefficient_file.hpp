@@ -55,8 +55,9 @@ struct Coefficients {
   /// Drag torque of one occlusion.
   struct Torque {
     Radians occlusion;
-    double k_q = 0;           ///< N m/(rad/s)², magnitude
-    std::optional<double> u;  ///< standard uncertainty of k_q
+    double k_q = 0;  ///< N m/(rad/s)², magnitude
+    std::optional<Uncertainty> uncertainty;
+    std::optional<double> per_thrust_m, per_thrust_expanded_95_m;  ///< κ = k_q/k, half of its 95 % interval
   };
   struct Run {
     std::string file;
@@ -92,6 +93,17 @@ struct Coefficients {
   /// Of the thrust that flies, share, 95 %; where it is worst; up to which it is fit to fly, or to fly with care.
   struct ThrustError {
     std::optional<double> share_95, phi_deg, fit_to_fly, with_care;
+    std::string where{};  ///< the vehicle for whose φ and speeds; empty: for all of the file's
+  };
+  /// The same for φ up to a row's and speeds no further than a column's from `reference_rad_s`; without rows: not told.
+  struct ThrustErrorWithin {
+    struct Row {
+      double phi_deg = 0;
+      std::vector<double> shares;  ///< one for each column
+    };
+    double reference_rad_s = 0;
+    std::vector<double> off_rad_s;  ///< ascending
+    std::vector<Row> rows;          ///< ascending
   };
   std::string path;
   std::string origin;  ///< measured, simulated; empty: not told
@@ -107,6 +119,8 @@ struct Coefficients {
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
   std::vector<std::string> assumed;               ///< sources in them that nobody measured
   ThrustError thrust_error;
+  ThrustErrorWithin thrust_error_within;
+  std::string doubts_allow;                ///< the verdict, whatever the number; empty: not told
   std::string verdict;                     ///< of the fit: fit_to_fly, with_care, not_yet; empty: not told
   bool anchored = false;                   ///< k(0) of the curve is K_T
   std::vector<Radians> points;             ///< occlusions behind the curve

@@ -24,7 +24,7 @@ const char* read_morphing_vehicle(ParameterReader parameter, MorphingVehicle& ve
 
 class ActuatorEffectivenessMorphing : public ActuatorEffectiveness {
  public:
-  /// Returns nullptr, or the reason why this vehicle cannot fly; there is no matrix then, and PX4 drives no motor.
+  /// Returns nullptr, or the reason why this vehicle cannot fly: PX4 then gets no matrix and drives no motor.
   /// Until arms are measured, they count as those of the reference shape.
   const char* build(const MorphingVehicle& vehicle);
 

@@ -19,7 +19,7 @@ class StandAtRest {
   StandAtRest(Bench& bench, const std::function<bool()>& stop_asked);
   /// Throws SafetyStop once the rotor turned, or could. Any thread.
   void check() const { guard_->check(); }
-  /// The motor, as far as kphi knows.
+  /// The motor may have power: kphi has not switched its supply off.
   [[nodiscard]] bool has_power() const { return has_power_; }
   /// One sentence on motor and supply, for whoever comes near.
   [[nodiscard]] std::string condition() const;

@@ -260,10 +260,11 @@ class CampaignRun {
   }
 
   bool ask_for_another(const AnotherRun& question) {
-    const RestGuard guard(bench_, true);
+    RestGuard guard(bench_, true);
+    guard.await_rest(stop_asked_);
     person_.while_waiting([&] { guard.check(); });
-    progress_.asks(
-        {fmt::format("Run {:g}° again? {}", question.occlusion_deg, question.reason), question.occlusion_deg});
+    progress_.asks({fmt::format("Run {:g}° again? {}", question.occlusion_deg, question.reason), question.occlusion_deg,
+                    review_.repetitions(question.occlusion_deg) + 1, static_cast<int>(result_.runs) + 1});
     const Answered answered(progress_);
     const bool yes = person_.run_again(question);
     person_.while_waiting({});
@@ -323,7 +324,7 @@ class CampaignRun {
     const double occlusion_deg = planned.occlusion_deg;
     if (!planned.mount && mounted_ && mounted_->occlusion_deg() == occlusion_deg) return;
     mounted_.reset();
-    const MountConfirmation confirmed = let_mount(occlusion_deg);
+    const MountConfirmation confirmed = let_mount(planned);
     bench_.mounted(campaign_.propeller.id, occlusion_deg);
     bench_.restore_power(stop_asked_);
     mounted_ = confirmed;
@@ -343,11 +344,12 @@ class CampaignRun {
     Progress& progress_;
   };
 
-  MountConfirmation let_mount(double occlusion_deg) {
+  MountConfirmation let_mount(const profiles::PlannedRun& planned) {
+    const double occlusion_deg = planned.occlusion_deg;
     return ask_at_the_stand(bench_, person_, stop_asked_, [&](const StandAtRest& stand) {
       progress_.asks({occlusion_deg == 0 ? "Take the occlusion off, then type 0."
                                          : fmt::format("Mount {0:g}°, then type {0:g}.", occlusion_deg),
-                      occlusion_deg, stand.has_power(),
+                      occlusion_deg, planned.repetition, static_cast<int>(result_.runs) + 1, stand.has_power(),
                       draw_plates(profiles::sketch_of(campaign_.propeller, config_.iq.spin), {occlusion_deg})});
       const Answered answered(progress_);
       const bool first = !std::exchange(has_asked_, true);

@@ -70,7 +70,7 @@ std::vector<Finding> findings_of(const supply::Identity& identity, const SupplyR
     findings.push_back(
         {Severity::note,
          identity.keypad == SupplyKeypad::locked
-             ? "its keypad is locked while kphi asks it: its output key is no switch for you"
+             ? "its keypad is locked while kphi asks it, so its output key switches nothing"
              : "its maker's firmware locks the keypad while kphi asks it; this one says that it does not",
          "have another switch for the 12 V within reach"});
   if (reading.protection != SupplyProtection::none) {

@@ -107,7 +107,7 @@ Message reached_message(const std::string& text) {
 
 Message ask_message(const StandQuestion& question) {
   ordered_json message{{"type", "ask"}};
-  KPHI_JSON_MEMBERS(message, question, text, occlusion_deg, has_power, drawing);
+  KPHI_JSON_MEMBERS(message, question, text, occlusion_deg, repetition, run, has_power, drawing);
   return {Message::Kind::other, text_of(message)};
 }
 

@@ -15,8 +15,8 @@
 //   step     a step is over: occlusion_deg, repetition, step, speed_rpm, speed2_rad2_s2, thrust_n, k_n_s2, u_k_n_s2, n
 //   line     a line of the log: time_s, text
 //   ask      a person is asked this in the terminal, the rotor is at rest and locked meanwhile: text ("": answered),
-//            occlusion_deg of the next run, has_power (the motor, as far as kphi knows), drawing (SVG of what is to be
-//            mounted, or "")
+//            occlusion_deg, repetition and run of the next run, has_power (false: kphi has switched the motor's supply
+//            off), drawing (SVG of what is to be mounted, or "")
 //   reached  what the campaign knows so far: text
 //   stop     STOP was pressed on a page: time_s
 //   end      the run is over: time_s, well (bool), text

@@ -40,8 +40,10 @@ struct Position {
 /// The rotor is at rest meanwhile.
 struct StandQuestion {
   std::string text;          ///< one line; empty: no question
-  double occlusion_deg = 0;  ///< of the run that follows
-  bool has_power = true;     ///< the motor, as far as kphi knows
+  double occlusion_deg = 0;  ///< of the run that follows, as are these
+  int repetition = 0;        ///< 1-based; negative: a reference run
+  int run = 0;               ///< 1-based
+  bool has_power = true;     ///< false: kphi has switched the motor's supply off
   std::string drawing{};     ///< SVG of what is to be mounted; may be empty
 };
 

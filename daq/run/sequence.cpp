@@ -341,6 +341,10 @@ void Sequence::change_speed() {
 netbox::ZeroMeasurement Sequence::hold_zero(Phase phase) {
   mark(phase);
   hold(from_seconds(order_.campaign.zero.value()));
+  if (phase == Phase::zero_after) {  // the end of the run, whenever it was expected
+    end_ = bench_.clock().now();
+    show_progress();
+  }
   progress_.step_done(position_, seen_);
   return recorder_.measured();
 }
@@ -385,8 +389,12 @@ void Sequence::tick(MotorEnable* spin) {
   recorder_.check_failure();
   spin ? spin->renew() : guard_.check(false);
   show_events();
+  seen_ = guard_.observe(bench_.clock().now());
+  show_progress();
+}
+
+void Sequence::show_progress() {
   const Instant now = bench_.clock().now();
-  seen_ = guard_.observe(now);
   const Duration left = std::max(Duration(0), end_ - now), passed = std::max(Duration(1), now - begin_);
   const double share = to_seconds(passed) / to_seconds(passed + left);
   position_.done = std::max(position_.done, (std::max(position_.run, 1) - 1 + share) / std::max(position_.runs, 1));

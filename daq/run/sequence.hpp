@@ -85,6 +85,7 @@ class Sequence {
   void wait_for_standstill();
   void hold(Duration duration, MotorEnable* spin = nullptr);
   void tick(MotorEnable* spin);
+  void show_progress();
   void show_events();
 
   Bench& bench_;

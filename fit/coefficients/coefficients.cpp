@@ -194,6 +194,23 @@ std::string provenance_block(const Fitted& fitted, const Provenance& provenance)
 
 std::string number_or_none(const std::optional<double>& value) { return value ? number(*value) : "none"; }
 
+/// Rows of φ and of the shares up to it; empty if they are unknown.
+std::string error_within(const ThrustErrorWithin& within) {
+  if (within.rows.empty()) return {};
+  std::vector<double> off;
+  for (const double one : within.off_rad_s) off.push_back(printed_rpm(one));
+  std::string text = fmt::format(
+      "  thrust_error_within:  # the same for phi up to the first number, and speeds as near to reference_rpm\n"
+      "    reference_rpm: {}\n    speed_off_rpm: {}\n    rows:\n",
+      yaml_number(printed_rpm(within.reference_rad_s)), list(off));
+  for (const ThrustErrorWithin::Row& row : within.rows) {
+    text += fmt::format("      - [{}", shortest(row.phi_deg));
+    for (const double share : row.shares) text += fmt::format(", {:.4f}", share);
+    text += "]\n";
+  }
+  return text;
+}
+
 std::string analysis_blocks(const Analysis& analysis) {
   std::string text = "uncertainty:  # by the GUM: u standard, expanded_95 half of the 95 % interval\n";
   text += fmt::format("  covariance: {}  # of K_T and the parameters of the curve, in their order\n",
@@ -209,9 +226,11 @@ std::string analysis_blocks(const Analysis& analysis) {
       "worst\n",
       number(flight.error.share), number(flight.error.phi_deg), number(flight.limits.fit_to_fly),
       number(flight.limits.with_care));
+  text += error_within(flight.error.within);
   std::vector<std::string> doubts;
   for (const Doubt& doubt : flight.doubts) doubts.push_back(quoted(doubt.text));
-  text += fmt::format("  verdict: {}\n  doubts: [{}]\n", name_of(flight.readiness()), fmt::join(doubts, ", "));
+  text += fmt::format("  verdict: {}\n  doubts: [{}]\n  doubts_allow: {}  # whatever the number\n",
+                      name_of(flight.readiness()), fmt::join(doubts, ", "), name_of(flight.by_doubts()));
   text += fmt::format(
       "  curve: {{clipping_deg: {}, zero_deg: {}, k0_minus_K_T: {}, u: {}, lack_of_fit_p: {}, quadratic_p: {}}}\n",
       number_or_none(analysis.shape.clipping_deg), number_or_none(analysis.shape.zero_deg),
@@ -224,10 +243,11 @@ std::string analysis_blocks(const Analysis& analysis) {
   text += fmt::format("  rejected_points: {}\n  outlying_runs: {}  # kept\n", analysis.rejected.size(),
                       analysis.outlying.size());
   if (analysis.torque.empty()) return text;
-  text += "torque:  # N m/(rad/s)^2, by the estimators of the thrust\n";
+  text += "torque:  # N m/(rad/s)^2\n";
   for (const TorqueCoefficient& one : analysis.torque)
-    text += fmt::format("  - {{phi_deg: {}, k_q: {}, u: {}, drag_per_thrust_m: {}}}\n", number(one.phi_deg),
-                        number(one.k_q.value), number(one.k_q.u), number(one.drag_per_thrust_m.value));
+    text += fmt::format("  - {{phi_deg: {}, k_q: {}, {}, drag_per_thrust_m: {}, drag_per_thrust_expanded_95_m: {}}}\n",
+                        number(one.phi_deg), number(one.k_q.value), errors(one.k_q),
+                        number(one.drag_per_thrust_m.value), number(expanded(one.drag_per_thrust_m)));
   return text;
 }
 

@@ -22,8 +22,6 @@
 namespace kphi::fit {
 namespace {
 
-constexpr double kNormal = std::numeric_limits<double>::infinity();  // degrees of freedom
-
 /// "± 2.1e-09 (95 %, GUM; without calibration, which is unknown)".
 std::string uncertainty_words(const compensation::Coefficients& file) {
   if (!file.thrust_coefficient) return "uncertainty unknown";
@@ -70,17 +68,20 @@ std::optional<TorquePerThrust> torque_per_thrust(const compensation::Coefficient
   const double width = (right.occlusion - left.occlusion).value();
   const double part = width > 0 ? (phi - left.occlusion.value()) / width : 0;
   const double k_q = left.k_q + part * (right.k_q - left.k_q), k = coefficient_at(file, phi_deg);
+  const auto share = [](const compensation::Coefficients::Torque& row) {
+    const double unknown = std::numeric_limits<double>::quiet_NaN();
+    return row.per_thrust_expanded_95_m.value_or(unknown) / row.per_thrust_m.value_or(unknown);
+  };
   TorquePerThrust result{k_q / k, std::nullopt};
-  if (left.u && right.u && file.thrust_coefficient)
-    result.u = result.value * std::hypot(std::max(*left.u, *right.u) / k_q,
-                                         file.thrust_coefficient->u / file.curve.thrust_coefficient().value());
+  if (const double worst = std::max(share(left), share(right)); std::isfinite(share(left) + share(right)))
+    result.expanded_95 = result.value * worst;
   return result;
 }
 
 /// "0.01226 ± 0.00009 m (95 %)".
 std::string words_of(const TorquePerThrust& torque) {
-  return torque.u ? fmt::format("{:.4g} ± {:.2g} m (95 %)", torque.value, coverage_factor(kNormal, 0.95) * *torque.u)
-                  : fmt::format("{:.4g} m", torque.value);
+  return torque.expanded_95 ? plain_with_error(torque.value, *torque.expanded_95) + " m (95 %)"
+                            : fmt::format("{:.4g} m, ± unknown", torque.value);
 }
 
 std::string words_of(const compensation::Coefficients::ThrottleLaw& law, const std::string& number) {
@@ -129,16 +130,20 @@ bool is_simulated(const compensation::Coefficients& file) { return origin_named(
 /// "5x3, Cyclone T5040C; 1.23e-06 N/(rad/s)^2 at phi = 0 deg; measured …, fitted by kphi …; 15 runs", one line each.
 std::vector<std::string> provenance_lines(const compensation::Coefficients& file) {
   const auto known = [](const std::string& text) { return text.empty() ? std::string("unknown") : one_line(text); };
-  return {fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)),
-          fmt::format("K_T {} N/(rad/s)^2, {}", yaml_number(file.curve.thrust_coefficient().value()),
-                      uncertainty_words(file)),
-          fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())),
-          fmt::format("origin: {}; verdict: {}", origin_words(file), verdict_words(file)),
-          fmt::format("{} {}, campaign {}, {} runs, fitted by kphi {}", is_simulated(file) ? "simulated" : "measured",
-                      known(file.measured_utc), known(file.provenance.campaign), file.provenance.runs.size(),
-                      known(file.tool_version)),
-          file.air_density_kg_m3 ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
-                                 : "air density unknown; k holds for the air of that day"};
+  std::vector<std::string> lines{
+      fmt::format("propeller {}, {}", known(file.propeller.id), known(file.propeller.name)),
+      fmt::format("K_T {} N/(rad/s)^2, {}", yaml_number(file.curve.thrust_coefficient().value()),
+                  uncertainty_words(file)),
+      fmt::format("phi is meant as the {} of the overlap", compensation::name_of(file.curve.overlap())),
+      fmt::format("origin: {}; verdict: {}", origin_words(file), verdict_words(file)),
+      fmt::format("{} {}, campaign {}, {} runs, fitted by kphi {}", is_simulated(file) ? "simulated" : "measured",
+                  known(file.measured_utc), known(file.provenance.campaign), file.provenance.runs.size(),
+                  known(file.tool_version)),
+      file.air_density_kg_m3 ? fmt::format("in air of {:.4g} kg/m3; k scales with density", *file.air_density_kg_m3)
+                             : "air density unknown; k holds for the air of that day"};
+  if (const auto torque = torque_per_thrust(file, 0))
+    lines.push_back(fmt::format("torque per newton of thrust {}, without occlusion", words_of(*torque)));
+  return lines;
 }
 
 /// Those lines, each behind `mark`.
@@ -287,8 +292,10 @@ std::string verdict_words(const compensation::Coefficients& file) {
   const auto readiness = readiness_named(file.verdict);
   if (!readiness) return "unknown";
   const auto& share = file.thrust_error.share_95;
+  const std::string where =
+      file.thrust_error.where.empty() ? "" : fmt::format(" where {} flies", one_line(file.thrust_error.where));
   return fmt::format("{}{}", words(*readiness),
-                     share ? fmt::format(", thrust within {} % (95 %)", two_digits(100 * *share)) : "");
+                     share ? fmt::format(", thrust within {} % (95 %){}", two_digits(100 * *share), where) : "");
 }
 
 }  // namespace kphi::fit

@@ -18,14 +18,14 @@ void require_curve(const compensation::Coefficients& file, const std::string& wh
 /// rad/s at full output: the option, else the vehicle's, else the file's. Throws ConfigurationError without any.
 [[nodiscard]] double speed_max_of(const compensation::Coefficients& file, const ExportOptions& options);
 
-/// Torque per thrust, m, with its standard uncertainty.
+/// Torque per thrust, m, with half of its 95 % interval.
 struct TorquePerThrust {
   double value = 0;
-  std::optional<double> u;
+  std::optional<double> expanded_95;  ///< nullopt: the file does not tell
 };
 /// Of a rotor at this φ: drag torque between the measured occlusions, over K_T k_i. nullopt: not measured.
 [[nodiscard]] std::optional<TorquePerThrust> torque_per_thrust(const compensation::Coefficients& file, double phi_deg);
-/// "0.01226 ± 0.00009 m (95 %)".
+/// "0.01226 ± 0.00009 m (95 %)", "0.01226 m, ± unknown".
 [[nodiscard]] std::string words_of(const TorquePerThrust& torque);
 inline constexpr const char* kNoTorque =
     "torque: the coefficient file has none; measure it with the load cell's torque axis";

@@ -129,6 +129,10 @@ Export to_ros2(const compensation::Coefficients& file, const ExportOptions& opti
   parameters.number("thrust_coefficient_expanded_95_n_s2_per_rad2",
                     K_T ? std::optional(K_T->expanded_95) : std::nullopt);
   if (!file.alone()) add_curve(file.curve, parameters);
+  if (const auto torque = torque_per_thrust(file, 0)) {
+    parameters.number("torque_per_thrust_m", torque->value);
+    parameters.number("torque_per_thrust_expanded_95_m", torque->expanded_95);
+  }
   if (const auto numbers = numbers_of(file); !numbers.torque.empty()) {
     std::vector<double> phi, share;
     for (const compensation::Knot& knot : numbers.torque)

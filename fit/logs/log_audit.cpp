@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <future>
 #include <iterator>
@@ -202,6 +203,12 @@ void audit_current_limit(const StandLog& log, SpeedSource source, Findings& find
 
 // ---- zero --------------------------------------------------------------------------------------------------
 
+/// So far off the mean is a row of noise alone in one of 1,000 logs of so many rows (Bonferroni).
+double furthest_by_chance(const RestRows& rest, std::size_t rows) {
+  const boost::math::students_t distribution(static_cast<double>(rest.rows - 1));
+  return rest.sd_n * boost::math::quantile(complement(distribution, 1e-3 / static_cast<double>(rows)));
+}
+
 /// `tare_n` is what the import subtracts.
 void audit_zero(const StandLog& log, const std::optional<RestRows>& before, const std::optional<RestRows>& after,
                 double tare_n, Findings& findings) {
@@ -224,7 +231,7 @@ void audit_zero(const StandLog& log, const std::optional<RestRows>& before, cons
     add(findings, FindingKind::zero_missing, log.rows.size(), 0,
         "no rows with the motor off at the beginning tell the zero");
   }
-  const double noise = std::max(5e-3 * largest, before ? 3 * before->sd_n : 0);
+  const double noise = std::max(5e-3 * largest, before ? furthest_by_chance(*before, log.rows.size()) : 0);
   double lowest = 0;
   for (const StandRow& row : log.rows) lowest = std::min(lowest, row.thrust_n);
   add(findings, FindingKind::negative_thrust,

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/students_t.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
 
 #include "base/number.hpp"
@@ -60,18 +61,17 @@ std::size_t terms_of(const FormFacts& facts) {
   return static_cast<std::size_t>(std::ranges::find(facts.parameters, nullptr) - facts.parameters.begin());
 }
 
-/// m of x = curve(m), which rises.
-double throttle_of_curve(double x, const auto& curve) {
-  double low = 0, high = 1.5;
-  for (int i = 0; i < 50; ++i) {
-    const double m = (low + high) / 2;
-    (curve(m) < x ? low : high) = m;
-  }
-  return (low + high) / 2;
+/// m of x = c₁ m + c₂ m² + c₃ m³, which rises from 0 at 0 to 1 at 1; straight on beyond full throttle, where it turns.
+double throttle_of_cubic(double x, const std::array<double, 3>& c) {
+  constexpr double kMost = 1.5;
+  constexpr int kBits = 48;
+  if (!(x > 0)) return 0;
+  if (!(x < 1)) return std::min(x, kMost);
+  const auto off = [&](double m) {
+    return std::pair(m * (c[0] + m * (c[1] + m * c[2])) - x, c[0] + m * (2 * c[1] + 3 * m * c[2]));
+  };
+  return boost::math::tools::newton_raphson_iterate(off, x, 0.0, 1.0, kBits);
 }
-
-/// Straight on beyond full throttle, where the curves turn.
-double boosted(double m, const auto& boost) { return m < 1 ? m * boost(m) : m; }
 
 using ThrottleTerms = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostTerms, 1>;
 using ThrottleSquares = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostTerms, kMostTerms>;
@@ -227,14 +227,12 @@ double thrust_of_throttle(ThrottleForm form, std::span<const double> p, double t
       return parabola(x * voltage);
     case ThrottleForm::betaflight: {
       const double e = std::clamp(p[1], -1.25, 1.25);  // beyond, the curve does not rise everywhere
-      return p[0] * throttle_of_curve(x, [e](double m) {
-               return boosted(m, [e](double at) { return 1 + e * (1 - at) * (1 + e * (1 - 2 * at)); });
-             });
+      // m (1 + e (1 − m) (1 + e (1 − 2 m)))
+      return p[0] * throttle_of_cubic(x, {1 + e + e * e, -e - 3 * e * e, 2 * e * e});
     }
     case ThrottleForm::betaflight_4_2: {
       const double t = std::clamp(p[1], -0.9, 2.9);
-      return p[0] * throttle_of_curve(
-                        x, [t](double m) { return boosted(m, [t](double at) { return 1 + t * square(1 - at); }); });
+      return p[0] * throttle_of_cubic(x, {1 + t, -2 * t, t});  // m (1 + t (1 − m)²)
     }
     case ThrottleForm::crazyflie: {
       const double v = throttle * voltage;

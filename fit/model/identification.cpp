@@ -148,6 +148,17 @@ Identification with_curve(Identification result) {
   return result;
 }
 
+std::string no_step_left(std::span<const StepMean> steps, const StepSelection& selection, const SpeedRange& range) {
+  const double fastest = to_rpm(RadPerSec(level(*std::ranges::max_element(steps, {}, level))));
+  const double least = to_rpm(RadPerSec(range.min_rad_s));
+  std::string text = fmt::format("no step left to fit: {} outside the speed range, {} flagged", selection.outside_range,
+                                 selection.flagged.size());
+  if (fastest < least)
+    text += fmt::format("; the fastest is at {:.0f} RPM, those from {:.0f} RPM on are fitted{}", fastest, least,
+                        to_rpm(RadPerSec(fastest)) > least ? " (if it is rad/s, name the unit of the speed)" : "");
+  return text + "; widen the range (--speed-range-rpm) or repeat the runs";
+}
+
 }  // namespace
 
 std::optional<Estimate> air_of(std::span<const results::StepMean> steps) {
@@ -222,9 +233,7 @@ Identification identify(std::span<const StepMean> steps, const IdentificationOpt
   result.air = air_of(result.selection.used);
   const StepsByAngle angles = by_angle(result.selection.used);
   if (angles.empty()) {
-    throw FitError(
-        fmt::format("no step left to fit: {} outside the speed range, {} flagged; widen the range or repeat the runs",
-                    result.selection.outside_range, result.selection.flagged.size()));
+    throw FitError(no_step_left(steps, result.selection, options.speed_range));
   }
   result.at_speed_rad_s = options.at_speed_rad_s.value_or(highest_common_level(angles));
 

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
 #include "base/error.hpp"
-#include "fit/model/identification.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -29,36 +29,19 @@ std::vector<results::StepMean> torque_steps(std::span<const results::StepMean> s
   return result;
 }
 
-double relative(const Estimate& estimate) { return estimate.value != 0 ? estimate.u / std::abs(estimate.value) : 0; }
-
 }  // namespace
 
-std::vector<TorqueCoefficient> identify_torque(std::span<const results::StepMean> steps,
-                                               std::span<const double> phis_deg, std::span<const Estimate> k) {
-  std::vector<TorqueCoefficient> result;
+std::optional<TorqueFit> fit_torque(std::span<const results::StepMean> steps, const IdentificationOptions& options) {
   const std::vector<results::StepMean> torques = torque_steps(steps);
-  if (torques.empty()) return result;
-  Repeatability repeatability;
-  std::vector<OcclusionCoefficient> table;
+  if (torques.empty()) return std::nullopt;
+  TorqueFit fitted;
   try {
-    table = coefficients_of(torques, {}, 0, repeatability);
+    fitted.table = coefficients_of(torques, {.mounting = options.mounting, .mounted_once = options.mounted_once}, 0,
+                                   fitted.repeatability);
   } catch (const FitError&) {
-    return result;
+    return std::nullopt;
   }
-  if (table.size() != phis_deg.size() || table.front().k == 0) return result;
-  const double freedom = repeatability.repeated ? repeatability.freedom() : 0;
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    TorqueCoefficient row;
-    row.phi_deg = table[i].phi_deg;
-    row.k_q = {table[i].k, table[i].standard_error,
-               repeatability.repeated ? freedom : static_cast<double>(table[i].fit->n - 1)};
-    row.share = table[i].k / table.front().k;
-    row.share_u = i == 0 ? 0 : std::abs(row.share) * std::hypot(relative(row.k_q), relative(result.front().k_q));
-    row.drag_per_thrust_m = {row.k_q.value / k[i].value, 0, std::min(row.k_q.freedom, k[i].freedom)};
-    row.drag_per_thrust_m.u = std::abs(row.drag_per_thrust_m.value) * std::hypot(relative(row.k_q), relative(k[i]));
-    result.push_back(row);
-  }
-  return result;
+  return fitted.table.front().k > 0 ? std::optional(std::move(fitted)) : std::nullopt;
 }
 
 std::vector<StepPower> power_of(std::span<const results::StepMean> steps) {

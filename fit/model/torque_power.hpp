@@ -1,27 +1,25 @@
-// What thrust costs: torque, Q = k_Q(φ) ω² by the estimators of the thrust (the yaw authority that an occluded rotor
-// keeps is measured, not assumed), and electrical power.
+// What thrust costs: torque, Q = k_Q(φ) ω², and electrical power.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "fit/numerics/hypothesis_test.hpp"
+#include "fit/model/identification.hpp"
 #include "results/step_mean.hpp"
 
 namespace kphi::fit {
 
-struct TorqueCoefficient {
-  double phi_deg = 0;
-  Estimate k_q;      ///< N m/(rad/s)², magnitude
-  double share = 1;  ///< of k_Q(0)
-  double share_u = 0;
-  Estimate drag_per_thrust_m;  ///< κ = k_Q/k, m, for the control allocation of a rotor at this φ
+/// k_Q per φ, ascending, positive, and how it repeats: N m stand where a thrust has N.
+struct TorqueFit {
+  std::vector<OcclusionCoefficient> table;
+  Repeatability repeatability;
 };
 
-/// One row per φ, ascending; empty if the steps have no torque. `k` as identified, in the same order of φ.
-[[nodiscard]] std::vector<TorqueCoefficient> identify_torque(std::span<const results::StepMean> steps,
-                                                             std::span<const double> phis_deg,
-                                                             std::span<const Estimate> k);
+/// Least squares through the origin; mountings as in `options`. nullopt if the steps have no torque, or no k_Q can be
+/// fitted.
+[[nodiscard]] std::optional<TorqueFit> fit_torque(std::span<const results::StepMean> steps,
+                                                  const IdentificationOptions& options);
 
 /// Mean over the repetitions of one step at one occlusion.
 struct StepPower {

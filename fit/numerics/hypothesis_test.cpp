@@ -58,4 +58,8 @@ HypothesisTest f_test(double value, double freedom, double error_freedom) {
   return test;
 }
 
+double expanded(const Estimate& estimate) {
+  return std::isnan(estimate.u) ? estimate.u : coverage_factor(estimate.freedom) * estimate.u;
+}
+
 }  // namespace kphi::fit

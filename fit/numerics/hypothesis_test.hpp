@@ -49,5 +49,7 @@ struct Estimate {
 
 /// Student's two-sided factor: value ± factor · u covers with `level`. Infinite freedom: 1.96.
 [[nodiscard]] double coverage_factor(double freedom, double level = 0.95);
+/// Half of the 95 % interval; NaN: unknown.
+[[nodiscard]] double expanded(const Estimate& estimate);
 
 }  // namespace kphi::fit

@@ -27,9 +27,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kUnit = "N/(rad/s)^2";
+constexpr const char *kUnit = "N/(rad/s)^2", *kTorqueUnit = "N m/(rad/s)^2";
 
 std::string coefficient_name(double phi_deg) { return fmt::format("k({:g}°)", std::round(phi_deg * 1e6) / 1e6); }
+
+std::string torque_name(double phi_deg) { return "k_Q" + coefficient_name(phi_deg).substr(1); }
 
 ComparedResult result_of(const compensation::Coefficients& file, const std::string& name) {
   ComparedResult result;
@@ -56,6 +58,8 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
     add(parameter.key.substr(0, per), per == std::string::npos ? kUnit : "N/(rad/s)^2 per degree", parameter.value,
         parameter.uncertainty, false);
   }
+  for (const auto& row : file.torque)
+    add(torque_name(to_degrees(row.occlusion)), kTorqueUnit, row.k_q, row.uncertainty, false);
   return result;
 }
 
@@ -197,6 +201,9 @@ ComparedResult result_of_log(const Fitted& fitted, Origin origin, const std::str
   result.speed_max_rad_s = found.speed_max_rad_s;
   result.air = found.air;
   result.estimates.push_back({"K_T", kUnit, K_T.value, K_T.combined(), true, K_T.freedom()});
+  for (const TorqueCoefficient& row : fitted.analysis.torque)
+    result.estimates.push_back(
+        {torque_name(row.phi_deg), kTorqueUnit, row.k_q.value, row.k_q.combined(), false, row.k_q.freedom()});
   return result;
 }
 

@@ -17,7 +17,8 @@ struct ComparedValue {
   std::string unit;
   double value = 0;
   double standard_error = 0;
-  /// Counts for the verdict: K_T and k(φ). The curve follows from them and is only shown.
+  /// Counts for the verdict: K_T and k(φ). The curve, which follows from them, and the torque are only
+  /// shown.
   bool judged = true;
   double freedom = std::numeric_limits<double>::infinity();  ///< degrees of freedom behind the standard error
 };

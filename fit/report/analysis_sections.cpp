@@ -127,14 +127,20 @@ std::string speed_section(const std::vector<SpeedDependence>& speed) {
 }
 
 std::string torque_section(const std::vector<TorqueCoefficient>& torque) {
-  HtmlTable table(
-      {"φ", "k<sub>Q</sub>, N m/(rad/s)²", "share of k<sub>Q</sub>(0)", "±", "κ = k<sub>Q</sub>/k, mm", "±"});
+  HtmlTable table({"φ", "k<sub>Q</sub>, N m/(rad/s)²", "share of k<sub>Q</sub>(0)", "95 %: ±",
+                   "κ = k<sub>Q</sub>/k, mm", "95 %: ±"});
   for (const TorqueCoefficient& one : torque)
-    table.row({html_angle(one.phi_deg), with_power_of_ten(one.k_q.value, one.k_q.u), html_number(one.share, "{:.4f}"),
-               one.phi_deg == 0 ? "–" : html_number(one.share_u, "{:.4f}"),
+    table.row({html_angle(one.phi_deg), with_power_of_ten(one.k_q.value, one.k_q.expanded()),
+               html_number(one.share.value, "{:.4f}"),
+               one.phi_deg == 0 ? "–" : html_number(expanded(one.share), "{:.4f}"),
                html_number(1e3 * one.drag_per_thrust_m.value, "{:.4f}"),
-               html_number(1e3 * one.drag_per_thrust_m.u, "{:.4f}")});
-  return html_section("Torque", table);
+               html_number(1e3 * expanded(one.drag_per_thrust_m), "{:.4f}")});
+  return html_section("Torque", table,
+                      torque.empty()
+                          ? ""
+                          : typeset(plus_minus_words(torque.front().k_q)) +
+                                ". The load cell's "
+                                "calibration and mountings count as for the thrust; the motor's clock cancels in κ.");
 }
 
 std::string prediction_section(const std::vector<CurvePrediction>& predictions) {

@@ -86,9 +86,10 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
   const bool at = identification.at_speed_rad_s > 0;
   Figure figure{
       "thrust_share",
-      fmt::format("Thrust in percent of the thrust without occlusion (boxes, left axis{}) and the coefficient "
-                  "k(φ) over all speeds (right axis, bars and band: 95 %). The fitted k(φ) is solid "
-                  "between the measured occlusions and dashed below them.",
+      fmt::format("Thrust in percent of the thrust without occlusion (left axis{}) and the coefficient k(φ) over all "
+                  "speeds (right axis, bars and band: 95 %). The boxes hold single samples of the load cell (step "
+                  "means where the run files are missing): most of their height is vibration, which averages out. "
+                  "The fitted k(φ) is solid between the measured occlusions and dashed below them.",
                   at ? fmt::format(", at {:.0f} RPM", rpm(identification.at_speed_rad_s)) : ""),
       {},
       "kind,phi_deg,value,expanded_95\n"};
@@ -104,7 +105,8 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
     if (rows.empty()) continue;
     data += data_block(fmt::format("share{}", i), rows);
     curves.push_back(fmt::format("$share{} using ({}):1 with boxplot lc rgb '#3b6ea5' fillcolor rgb '#a9c6e6' {}", i,
-                                 csv_cell(shares[i].phi_deg), curves.size() == 1 ? "title 'thrust'" : "notitle"));
+                                 csv_cell(shares[i].phi_deg),
+                                 curves.size() == 1 ? "title 'thrust, samples'" : "notitle"));
   }
   for (std::size_t i = 0; i < identification.table.size(); ++i) {
     const double phi = identification.table[i].phi_deg, k = identification.table[i].k,
@@ -209,7 +211,7 @@ Figure speed_figure(const Identification& identification) {
                               axis_reach(deviations, 1) / 2) +
                   "set label 2 'k at one speed relative to k of the range, %' at screen 0.018, "
                   "screen 0.5 center rotate by 90\n" +
-                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.12,0.97 spacing 0.02\n", last + 1) +
+                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.16,0.97 spacing 0.02\n", last + 1) +
                   panels + "unset multiplot\n";
   return figure;
 }

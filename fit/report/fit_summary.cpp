@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "base/json.hpp"
@@ -22,11 +23,58 @@ std::string number_line(const std::string& name, const Budget& budget, const std
                      per, with_error(rpm(budget.value), rpm(budget.expanded())), per);
 }
 
+/// "step 23" of neighbours, in one run.
+std::string place_of(const FlaggedStep& first, const FlaggedStep& last) {
+  const std::string steps = first.step.step == last.step.step
+                                ? fmt::format("step {}", first.step.step + 1)
+                                : fmt::format("steps {} to {}", first.step.step + 1, last.step.step + 1);
+  return fmt::format("phi {}°, repetition {}, {}", first.step.occlusion_deg, first.step.repetition, steps);
+}
+
+/// One line for all steps with one cause.
+std::string flagged_text(const std::vector<FlaggedStep>& all) {
+  constexpr std::size_t kNamed = 3;
+  struct Cause {
+    bool left_out = false;
+    std::string reason;
+    std::vector<std::string> places;
+    std::size_t steps = 0;
+  };
+  std::vector<Cause> causes;
+  for (auto first = all.begin(); first != all.end();) {
+    const auto follows = [&](const FlaggedStep& a, const FlaggedStep& b) {
+      return a.left_out == b.left_out && a.reason == b.reason && a.step.occlusion_deg == b.step.occlusion_deg &&
+             a.step.repetition == b.step.repetition && b.step.step == a.step.step + 1;
+    };
+    auto last = first;
+    while (last + 1 != all.end() && follows(*last, *(last + 1))) ++last;
+    auto cause = std::ranges::find_if(
+        causes, [&](const Cause& one) { return one.left_out == first->left_out && one.reason == first->reason; });
+    if (cause == causes.end()) cause = causes.insert(causes.end(), {first->left_out, first->reason, {}, 0});
+    cause->places.push_back(place_of(*first, *last));
+    cause->steps += static_cast<std::size_t>(last - first) + 1;
+    first = last + 1;
+  }
+  std::string text;
+  for (const Cause& cause : causes) {
+    const std::size_t named = std::min(cause.places.size(), kNamed);
+    const std::string more = named == cause.places.size() ? "" : fmt::format("; {} in all", cause.steps);
+    text +=
+        fmt::format("{:<13} {}{}: {}\n", cause.left_out ? "left out" : "kept",
+                    fmt::join(cause.places.begin(), cause.places.begin() + static_cast<std::ptrdiff_t>(named), "; "),
+                    more, cause.reason);
+  }
+  return text;
+}
+
 }  // namespace
 
 // Numbers that are not finite become null: JSON has neither NaN nor infinity.
 
-static void to_json(Json& json, const Estimate& one) { KPHI_JSON_MEMBERS(json, one, value, u, freedom); }
+static void to_json(Json& json, const Estimate& one) {
+  KPHI_JSON_MEMBERS(json, one, value, u, freedom);
+  json["expanded_95"] = expanded(one);
+}
 
 void to_json(Json& json, const HypothesisTest& test) {
   KPHI_JSON_MEMBERS(json, test, name, hypothesis, statistic, value, freedom, error_freedom, p);
@@ -66,7 +114,7 @@ static void to_json(Json& json, const CurvePrediction& one) {
 }
 
 static void to_json(Json& json, const TorqueCoefficient& one) {
-  json = {{"k_q_nm_per_rad2_s2", one.k_q}, {"u_share", one.share_u}};
+  json["k_q_nm_per_rad2_s2"] = one.k_q;
   KPHI_JSON_MEMBERS(json, one, phi_deg, share, drag_per_thrust_m);
 }
 
@@ -205,25 +253,12 @@ std::string headline_text(const Fitted& fitted) {
       text += number_line(analysis.parameters[i].quantity, analysis.parameters[i],
                           identification.curve_fit.parameters[i].per);
   if (!analysis.standard.empty()) text += number_line("k_standard", analysis.standard.front());
+  text += torque_line(analysis.torque);
   return text + plus_minus_words(analysis.standard.empty() ? K_T : analysis.standard.front()) + "\n";
 }
 
 std::string caution_text(const Identification& identification, const Analysis& analysis) {
-  std::string text;
-  const auto alike = [](const FlaggedStep& a, const FlaggedStep& b) {
-    return a.left_out == b.left_out && a.reason == b.reason && a.step.occlusion_deg == b.step.occlusion_deg &&
-           a.step.repetition == b.step.repetition && b.step.step == a.step.step + 1;
-  };
-  const std::vector<FlaggedStep>& all = identification.selection.flagged;
-  for (auto first = all.begin(); first != all.end();) {
-    auto last = first;
-    while (last + 1 != all.end() && alike(*last, *(last + 1))) ++last;
-    const std::string steps = first == last ? fmt::format("step {}", first->step.step + 1)
-                                            : fmt::format("steps {} to {}", first->step.step + 1, last->step.step + 1);
-    text += fmt::format("{:<13} phi {}°, repetition {}, {}: {}\n", first->left_out ? "left out" : "kept",
-                        first->step.occlusion_deg, first->step.repetition, steps, first->reason);
-    first = last + 1;
-  }
+  std::string text = flagged_text(identification.selection.flagged);
   for (const RejectedPoint& point : analysis.rejected) {
     text += fmt::format("rejected      phi {}°, repetition {}, step {}: {:+.3f} N off, robust weight {:.2f}\n",
                         point.phi_deg, point.repetition, point.step + 1, point.residual_n, point.robust_weight);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "base/csv.hpp"
+#include "fit/numerics/hypothesis_test.hpp"
 #include "fit/report/html.hpp"
 
 namespace kphi::fit {
@@ -21,8 +22,6 @@ constexpr std::array<Panel, kFollowed.size()> kPanels{
     {{"all k together, %", 100, 1}, {"K_T, 10⁻⁶ N/(rad/s)²", 1e6, 0}, {"slope, 10⁻⁹ N/(rad/s)² per °", 1e9, 0}}};
 
 bool is_named(const Chart& chart, std::size_t i) { return chart.change && chart.change->names(i); }
-
-double expanded(const Estimate& one) { return coverage_factor(one.freedom) * one.u; }
 
 }  // namespace
 

@@ -130,9 +130,13 @@ std::string typeset(std::string_view text) {
   const auto letter = [&](std::size_t at) {
     return at < result.size() && std::isalpha(static_cast<unsigned char>(result[at])) != 0;
   };
+  const auto of_a_name = [&](std::size_t at) {  // 5x3_phi000_rep1.h5
+    return letter(at) ||
+           (at < result.size() && (result[at] == '_' || std::isdigit(static_cast<unsigned char>(result[at])) != 0));
+  };
   for (const auto& [plain, set] : kSigns) {
     for (std::size_t at = result.find(plain); at != std::string::npos; at = result.find(plain, at + 1)) {
-      const bool in_a_word = letter(at + plain.size()) || (at > 0 && letter(at) && letter(at - 1));
+      const bool in_a_word = of_a_name(at + plain.size()) || (at > 0 && letter(at) && of_a_name(at - 1));
       if (!in_a_word) result.replace(at, plain.size(), set);
     }
   }

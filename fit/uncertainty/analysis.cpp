@@ -301,9 +301,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
                        options.limits);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);
-  std::vector<Estimate> k;
-  for (const Budget& budget : analysis.coefficients) k.push_back(budget.estimate());
-  if (from_steps) analysis.torque = identify_torque(identification.selection.used, phis, k);
+  if (from_steps) analysis.torque = torque_coefficients(identification, options.bench);
   return analysis;
 }
 

@@ -7,12 +7,12 @@
 
 #include "fit/model/curve_fit.hpp"
 #include "fit/model/identification.hpp"
-#include "fit/model/torque_power.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/uncertainty/budget.hpp"
 #include "fit/uncertainty/readiness.hpp"
 #include "fit/uncertainty/speed_dependence.hpp"
 #include "fit/uncertainty/speed_trend.hpp"
+#include "fit/uncertainty/torque_coefficient.hpp"
 
 namespace kphi::fit {
 

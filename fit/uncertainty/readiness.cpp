@@ -189,8 +189,12 @@ FlightReadiness flight_readiness(const Identification& identification, const Mod
   return flight;
 }
 
+Readiness FlightReadiness::by_doubts() const {
+  return doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
+}
+
 Readiness FlightReadiness::readiness() const {
-  const Readiness worst = doubts.empty() ? Readiness::fit_to_fly : doubts.front().readiness;
+  const Readiness worst = by_doubts();
   const Readiness by_number = error.share <= limits.fit_to_fly ? Readiness::fit_to_fly
                               : error.share > limits.with_care ? Readiness::not_yet
                                                                : Readiness::with_care;

@@ -40,6 +40,8 @@ struct FlightReadiness {
   bool has_curve = true;
   ReadinessLimits limits{};
 
+  /// Of the worst doubt.
+  [[nodiscard]] Readiness by_doubts() const;
   /// By the number, and no better than the worst doubt.
   [[nodiscard]] Readiness readiness() const;
 };

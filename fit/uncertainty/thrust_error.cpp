@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "base/number.hpp"
 #include "compensation/units.hpp"
+#include "results/reduction/bin_statistics.hpp"
 
 namespace kphi::fit {
 namespace {
@@ -45,13 +47,43 @@ Chord chord_at(const std::vector<OcclusionCoefficient>& table, double phi_deg) {
   return {table.size() - 1, table.size() - 1, 0};
 }
 
-double slope(const std::vector<OcclusionCoefficient>& table, std::size_t i) {
-  return (table[i + 1].k - table[i].k) / (table[i + 1].phi_deg - table[i].phi_deg);
+/// A linear function of the k of the table.
+using Weights = std::vector<double>;
+
+double value_of(const Weights& weights, const std::vector<OcclusionCoefficient>& table) {
+  double sum = 0;
+  for (std::size_t i = 0; i < table.size(); ++i) sum += weights[i] * table[i].k;
+  return sum;
 }
 
-/// Where k may lie between two measured φ, N/(rad/s)²; both on the chord at a measured one.
+/// By what is independent from φ to φ.
+double u_of(const Weights& weights, const std::vector<OcclusionCoefficient>& table) {
+  double squares = 0;
+  for (std::size_t i = 0; i < table.size(); ++i)
+    if (table[i].standard_error > 0) squares += std::pow(weights[i] * table[i].standard_error, 2);
+  return std::sqrt(squares);
+}
+
+Weights one_of(const std::vector<OcclusionCoefficient>& table, std::size_t row, double weight = 1) {
+  Weights weights(table.size());
+  weights[row] = weight;
+  return weights;
+}
+
+Weights sum_of(Weights a, const Weights& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) a[i] += b[i];
+  return a;
+}
+
+/// Slope of the chord from row i to the next, times a width in degrees.
+Weights rise_of(const std::vector<OcclusionCoefficient>& table, std::size_t i, double width_deg) {
+  const double share = width_deg / (table[i + 1].phi_deg - table[i].phi_deg);
+  return sum_of(one_of(table, i, -share), one_of(table, i + 1, share));
+}
+
+/// The two ends of where k may lie between two measured φ; both on the chord at a measured one.
 struct Between {
-  double low = 0, high = 0;
+  Weights chord, other;
 };
 
 /// A curve that bends one way lies between its chord and the chords beside it, drawn on; up to the widest occlusion,
@@ -59,34 +91,68 @@ struct Between {
 /// where too few occlusions tell which way it bends, that alone is known.
 Between between_occlusions(const std::vector<OcclusionCoefficient>& table, const Chord& chord, double phi_deg) {
   constexpr std::size_t kLeastRows = 4;
-  const OcclusionCoefficient &from = table[chord.before], &to = table[chord.after];
-  const double k = from.k * (1 - chord.share) + to.k * chord.share;
-  if (chord.before == chord.after) return {k, k};
-  const Between falls{std::min(from.k, to.k), std::max(from.k, to.k)};
-  if (table.size() < kLeastRows) return falls;
-  const double here = slope(table, chord.before);
-  double aside = std::numeric_limits<double>::infinity();
-  const auto take = [&](double beside) {
-    if (std::abs(beside) < std::abs(aside)) aside = beside;
+  const std::size_t from = chord.before, to = chord.after;
+  const Weights at_from = one_of(table, from), at_to = one_of(table, to);
+  const Weights middle = sum_of(one_of(table, from, 1 - chord.share), one_of(table, to, chord.share));
+  if (from == to) return {at_from, at_from};
+  if (table.size() < kLeastRows) return {at_from, at_to};
+  std::optional<Weights> aside;
+  const auto take = [&](const Weights& beside) {
+    if (!aside || std::abs(value_of(beside, table)) < std::abs(value_of(*aside, table))) aside = beside;
   };
-  const double beyond = chord.after + 1 < table.size() ? 1 : 1 - chord.share;
-  if (chord.before > 0) take((slope(table, chord.before - 1) - here) * (phi_deg - from.phi_deg) * beyond);
-  if (chord.after + 1 < table.size()) take((here - slope(table, chord.after)) * (to.phi_deg - phi_deg));
-  const double there = std::clamp(k + aside, falls.low, falls.high);
-  return {std::min(k, there), std::max(k, there)};
+  const double on = phi_deg - table[from].phi_deg, left = table[to].phi_deg - phi_deg;
+  const double beyond = to + 1 < table.size() ? 1 : 1 - chord.share;
+  if (from > 0) take(sum_of(rise_of(table, from - 1, on * beyond), rise_of(table, from, -on * beyond)));
+  if (to + 1 < table.size()) take(sum_of(rise_of(table, from, left), rise_of(table, to, -left)));
+  const Weights other = sum_of(middle, *aside);
+  const bool higher_first = table[from].k > table[to].k;
+  const Weights &highest = higher_first ? at_from : at_to, &lowest = higher_first ? at_to : at_from;
+  const double k = value_of(other, table);
+  if (k > value_of(highest, table)) return {middle, highest};
+  if (k < value_of(lowest, table)) return {middle, lowest};
+  return {middle, other};
 }
 
-/// What the speed does to k(φ) beyond what flies, at the slowest or the fastest speed; value and u as shares. One
-/// trend for all φ, and what no straight line says of this one.
-Estimate of_speed(const Identification& identification, const ThrustEvidence& evidence, std::size_t row) {
-  if (row >= evidence.speed.size() || evidence.speed[row].levels.size() < 2) return {};
+/// How far k may lie from what flies, as shares of it.
+struct Deviation {
+  double off = 0;  ///< as seen, less what noise makes of it in the mean
+  double u = 0;    ///< its error beyond that of k on the chord
+};
+
+/// Of one end of Between; `flown` in the same k.
+Deviation deviation_of(const Weights& end, const Weights& chord, const Weights& flown, double flown_k,
+                       const std::vector<OcclusionCoefficient>& table) {
+  const auto less = [](Weights a, const Weights& b) {
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
+    return a;
+  };
+  const double seen = value_of(end, table) / flown_k - 1, noise = u_of(less(end, flown), table) / flown_k;
+  return {std::sqrt(std::max(0.0, seen * seen - noise * noise)), u_of(less(end, chord), table) / flown_k};
+}
+
+/// What the speed does to k(φ) beyond what flies, as shares: one trend for all φ, and what no straight line says of
+/// this one.
+struct SpeedEffect {
+  Estimate per_rad_s{};
+  double reach_rad_s = 0;  ///< from the speed to which k belongs to the slowest or the fastest one
+  double excess = 0;
+
+  /// Of speeds no further than this from the one to which k belongs.
+  [[nodiscard]] Estimate within(double off_rad_s) const {
+    const double reach = std::min(reach_rad_s, off_rad_s);
+    return {std::max(per_rad_s.value * reach, excess), per_rad_s.u * reach, per_rad_s.freedom};
+  }
+};
+
+SpeedEffect of_speed(const Identification& identification, const ThrustEvidence& evidence, std::size_t row,
+                     double reference) {
+  SpeedEffect result;
+  if (row >= evidence.speed.size() || evidence.speed[row].levels.size() < 2) return result;
   const std::vector<SpeedCoefficient>& levels = evidence.speed[row].levels;
-  const double reference = reference_speed(identification);
-  const double reach = std::max(levels.back().speed_rad_s - reference, reference - levels.front().speed_rad_s);
+  result.reach_rad_s = std::max(levels.back().speed_rad_s - reference, reference - levels.front().speed_rad_s);
   const double flown = evidence.trend ? evidence.trend->per_rad_s.value : 0;
-  Estimate result;
   if (const auto all = common_trend(evidence.speed))
-    result = {std::abs(all->value - flown) * reach, all->u * reach, all->freedom};
+    result.per_rad_s = {std::abs(all->value - flown), all->u, all->freedom};
   double excess = 0, weights = 0;
   for (const SpeedCoefficient& level : levels) {
     if (std::isnan(level.standard_error)) return result;
@@ -95,7 +161,7 @@ Estimate of_speed(const Identification& identification, const ThrustEvidence& ev
     excess += weight * (std::pow(level.k / expected - 1, 2) - std::pow(level.standard_error / expected, 2));
     weights += weight;
   }
-  result.value = std::max(result.value, std::sqrt(std::max(0.0, excess / weights)));
+  result.excess = std::sqrt(std::max(0.0, excess / weights));
   return result;
 }
 
@@ -104,10 +170,22 @@ class Account {
   Account(const Identification& identification, const ThrustEvidence& evidence)
       : identification_(identification), evidence_(evidence) {
     if (!identification.alone()) curve_ = identification.curve();
-    for (std::size_t i = 0; i < identification.table.size(); ++i)
-      of_speed_.push_back(of_speed(identification, evidence, i));
+    constexpr std::array kReaches{0.25, 0.5, 0.75, 1.0};
+    within_.reference_rad_s = reference_speed(identification);
+    double reach = 0;
+    for (std::size_t i = 0; i < identification.table.size(); ++i) {
+      of_speed_.push_back(of_speed(identification, evidence, i, within_.reference_rad_s));
+      reach = std::max(reach, of_speed_.back().reach_rad_s);
+    }
+    if (!(reach > 0)) within_.off_rad_s = {0};
+    for (const double share : kReaches)
+      if (reach > 0) within_.off_rad_s.push_back(share * reach);
   }
 
+  /// Without rows.
+  [[nodiscard]] const ThrustErrorWithin& within() const { return within_; }
+
+  /// Its `within` has one row, of this φ alone.
   [[nodiscard]] ThrustError at(double phi_deg) const {
     const auto& table = identification_.table;
     const Chord chord = chord_at(table, phi_deg);
@@ -129,11 +207,14 @@ class Account {
                               .freedom = freedom,
                               .remedy = std::move(remedy)});
     };
-    const Estimate &before = of_speed_[chord.before], &after = of_speed_[chord.after];
-    const Estimate& speed = before.value > after.value ? before : after;
+    const Deviation beside = curve_ ? beside_at(chord, phi_deg, flown) : Deviation();
+    add("error of k(φ) between the occlusions", beside.u, std::numeric_limits<double>::infinity(),
+        "measure an occlusion there");
+    add("air density", evidence_.air_density_u.value_or(0), std::numeric_limits<double>::infinity(), "");
+    const Estimate steady{0, scatter.combined(), scatter.freedom()};
+    const Estimate speed = speed_at(chord, within_.off_rad_s.back());
     const std::string fewer = "fit the speeds of your flight alone (--speed-range-rpm)";
     add("error of the trend of k with the speed", speed.u, speed.freedom, fewer);
-    add("air density", evidence_.air_density_u.value_or(0), std::numeric_limits<double>::infinity(), "");
 
     ThrustError error{0, phi_deg, {}};
     const auto take = [&](std::string name, double share, std::string remedy) {
@@ -141,23 +222,31 @@ class Account {
       error.parts.push_back({std::move(name), share, std::move(remedy)});
     };
     if (curve_) {
-      const Between may = between_occlusions(table, chord, phi_deg);
-      const double beside = std::max(std::abs(may.low / flown - 1), std::abs(may.high / flown - 1));
       const bool measured = chord.before == chord.after;
       take(measured ? fmt::format("k(φ) beside the {}", name_of(identification_.curve_fit.form))
                     : fmt::format("k(φ) between {}", between),
-           beside, measured ? "fit a table (--form table)" : "measure an occlusion there");
+           beside.off, measured ? "fit a table (--form table)" : "measure an occlusion there");
     }
     take("k against speed", speed.value, fewer);
     take("a run that stands out", stray(chord), "repeat it, or leave it out (--leave-out)");
     if (phi_deg < first_occlusion())
       take("a plate left on at 0°", evidence_.plate_at_zero, "check it, and repeat the runs at 0° without a plate");
-    const double factor = scatter.coverage();
+    const double factor = scatter.coverage(), off = error.share - speed.value;
     for (const BudgetRow& row : scatter.rows)
       error.parts.push_back({row.source, factor * row.contribution(), row.remedy});
-    error.share =
-        folded(error.share, scatter.combined() * factor / coverage_factor(std::numeric_limits<double>::infinity()));
-    if (!known) error.share = std::numeric_limits<double>::quiet_NaN();
+    const double endless = coverage_factor(std::numeric_limits<double>::infinity());
+    error.share = folded(error.share, scatter.combined() * factor / endless);
+    std::vector<double> shares;
+    for (const double reach : within_.off_rad_s) {
+      if (reach == within_.off_rad_s.back()) break;
+      const Estimate less = speed_at(chord, reach);
+      const double u = std::hypot(steady.u, less.u);
+      const double freedom = results::joint_freedom(steady.u, steady.freedom, less.u, less.freedom);
+      shares.push_back(folded(off + less.value, u * coverage_factor(freedom) / endless));
+    }
+    shares.push_back(error.share);
+    error.within.rows.push_back({phi_deg, std::move(shares)});
+    if (!known) error.share = std::numeric_limits<double>::quiet_NaN(), error.within = {};
     std::erase_if(error.parts, [](const ThrustErrorPart& part) { return !(part.share > 0); });
     std::ranges::stable_sort(error.parts, std::greater{}, &ThrustErrorPart::share);
     return error;
@@ -169,6 +258,20 @@ class Account {
   }
 
  private:
+  /// The further end of where k may lie.
+  [[nodiscard]] Deviation beside_at(const Chord& chord, double phi_deg, double flown) const {
+    const auto& table = identification_.table;
+    const Between may = between_occlusions(table, chord, phi_deg);
+    const bool held = curve_->scaling_factor(from_degrees(phi_deg)) >= 1;  // at K_T
+    const Weights flies = held ? one_of(table, 0) : identification_.curve_fit.weights_at(phi_deg);
+    const Deviation near = deviation_of(may.chord, may.chord, flies, flown, table);
+    const Deviation far = deviation_of(may.other, may.chord, flies, flown, table);
+    return far.off > near.off ? far : near;
+  }
+  [[nodiscard]] Estimate speed_at(const Chord& chord, double off_rad_s) const {
+    const Estimate before = of_speed_[chord.before].within(off_rad_s), after = of_speed_[chord.after].within(off_rad_s);
+    return before.value > after.value ? before : after;
+  }
   [[nodiscard]] double flown_at(double phi_deg) const {
     return curve_->thrust_coefficient().value() * curve_->scaling_factor(from_degrees(phi_deg));
   }
@@ -189,21 +292,28 @@ class Account {
   const Identification& identification_;
   const ThrustEvidence& evidence_;
   std::optional<compensation::ThrustCurve> curve_;
-  std::vector<Estimate> of_speed_;  ///< one per row of the table
+  std::vector<SpeedEffect> of_speed_;  ///< one per row of the table
+  ThrustErrorWithin within_;
 };
 
 }  // namespace
 
 ThrustError thrust_error(const Identification& identification, const ThrustEvidence& evidence) {
-  constexpr int kPieces = 60;
+  constexpr int kPieces = 60, kPiecesOfRow = 3;
   constexpr double kFirstContactDeg = 0.01;  // there the line may be beside K_T already
   const Account account(identification, evidence);
+  const auto is_measured = [&](double phi) {
+    return std::ranges::any_of(identification.table, [phi](const auto& row) { return row.phi_deg == phi; });
+  };
   std::set<double> angles;
   for (const OcclusionCoefficient& one : identification.table) angles.insert(one.phi_deg);
   if (angles.size() > 1) angles.insert(kFirstContactDeg);
   for (int i = 1; i < kPieces; ++i) angles.insert(identification.table.back().phi_deg * i / kPieces);
   ThrustError worst;
+  ThrustErrorWithin within = account.within();
+  std::vector<double> up_to(within.off_rad_s.size());
   std::optional<double> carries_to;
+  std::size_t count = 0;
   for (const double phi : angles) {
     if (!account.carries(phi)) {
       carries_to = phi;
@@ -211,8 +321,11 @@ ThrustError thrust_error(const Identification& identification, const ThrustEvide
     }
     ThrustError here = account.at(phi);
     if (std::isnan(here.share)) return here;
+    for (std::size_t i = 0; i < up_to.size(); ++i) up_to[i] = std::max(up_to[i], here.within.rows.front().shares[i]);
+    if (count++ % kPiecesOfRow == 0 || phi == *angles.rbegin() || is_measured(phi)) within.rows.push_back({phi, up_to});
     if (std::isnan(worst.share) || here.share > worst.share) worst = std::move(here);
   }
+  worst.within = std::move(within);
   worst.carries_to_deg = carries_to;
   return worst;
 }

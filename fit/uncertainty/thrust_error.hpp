@@ -29,12 +29,25 @@ struct ThrustErrorPart {
   std::string remedy;  ///< the next move; may be empty
 };
 
+/// The same for a drone that needs less: φ from 0 up to a row's, speeds that are no further than a column's from the
+/// one to which k belongs.
+struct ThrustErrorWithin {
+  struct Row {
+    double phi_deg = 0;
+    std::vector<double> shares{};  ///< one per column, 95 %
+  };
+  double reference_rad_s = 0;
+  std::vector<double> off_rad_s{};  ///< ascending, the last holds all speeds of the fit; one of 0 if none are known
+  std::vector<Row> rows{};          ///< ascending, the last holds all φ at which a rotor carries
+};
+
 struct ThrustError {
   double share = std::numeric_limits<double>::quiet_NaN();  ///< of the thrust, 95 %; NaN: nobody knows
   double phi_deg = 0;                                       ///< where it is largest
   std::vector<ThrustErrorPart> parts{};                     ///< there, largest first
   /// From here on a rotor keeps less thrust than the library's floor, a tenth, and nothing flies on it: not counted.
   std::optional<double> carries_to_deg{};
+  ThrustErrorWithin within{};
 };
 
 /// What the number is made of beside the coefficients.

@@ -105,7 +105,7 @@ int main(int argc, char** argv) {
   std::vector<double> wall, cpu;
   Cost a, b;
   for (int i = 0; i < pairs; ++i) {
-    a = cost_of(ours, {KPHI_PROGRAM, "replay", folder.path()});
+    a = cost_of(ours, {KPHI_PROGRAM, "replay", "--csv", folder.path()});
     b = cost_of(theirs, {"/usr/bin/python3", kphi::test::source_dir() + "/test/bench/replay_peer.py", folder.path()});
     if (b.code != 0) {
       fmt::print("replay: the peer did not run (python3-numpy, python3-h5py?)\n");

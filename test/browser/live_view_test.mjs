@@ -100,6 +100,7 @@ async function stopBy(how, ask, page, bench, run) {
   assert.match(await page.locator('#banner').innerText(), /stopped by request/);
   assert.equal(await page.locator('#stop_word').innerText(), 'ENDED');
   await page.waitForFunction(() => document.getElementById('speed').textContent === '–');
+  assert.match(await page.locator('#speed_beside').innerText(), /^last value [\d ]+, not seen at rest$/, 'its power was cut while it turned');
   assert.match(await page.title(), /^STOPPED – browser/);
   await page.waitForFunction(() => document.getElementById('link').textContent === 'over');
   assert.ok(await page.evaluate(() => state.trace.length > 5), 'it keeps what it has');
@@ -173,6 +174,8 @@ try {
       const during = await seen.waitForFunction(() => state.steps.length >= 1 && !state.ended
         && { word: at('stop_word').textContent, disabled: at('stop').disabled });
       assert.deepEqual(await during.jsonValue(), { word: 'REPLAY', disabled: true });
+      assert.equal(await seen.locator('#link').innerText(), 'replay');
+      assert.match(await seen.title(), /^replay – /);
       assert.match(await seen.locator('.limit', { hasText: 'Thrust' }).innerText(), /≤ 20\.0 N/);
       await seen.keyboard.press('Escape');
       await seen.screenshot({ path: path.join(pictures, 'live_view_replay.png') });
@@ -208,11 +211,20 @@ try {
   });
 
   await it('says what is asked in the terminal, and that the motor is locked', async () => {
-    await page.evaluate(() => take.ask({ text: 'Mount 45°, then type 45.' }));
+    const drawing = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path class="plate" d="M0,0 L9,9"/></svg>';
+    await page.evaluate(drawing => take.ask({ text: 'Mount 45°, then type 45.', occlusion_deg: 45, repetition: 2, run: 7, has_power: false, drawing }), drawing);
     assert.equal(await page.locator('#banner').innerText(), 'Asked in the terminal: Mount 45°, then type 45. The motor is locked.');
     assert.match(await page.title(), /^waiting – /);
-    await page.evaluate(() => take.ask({ text: '' }));
+    await page.waitForFunction(() => at('speed_beside').textContent === 'at rest');
+    const shown = await page.evaluate(() => ['thrust', 'speed', 'supply', 'module', 'occlusion', 'repetition', 'run', 'step'].map(id => at(id).textContent));
+    assert.deepEqual(shown, ['–', '0', 'off', 'no power', '45°', '2/20', '7/20', 'waiting']);
+    assert.ok(await page.locator('#plate .plate').isVisible(), 'the plate is drawn');
+    assert.equal(await page.locator('#speed_card').isHidden(), true);
+    await page.evaluate(() => take.ask({ text: '', occlusion_deg: 0, repetition: 0, run: 0, has_power: true, drawing: '' }));
     assert.equal(await page.locator('#banner').isHidden(), true);
+    assert.equal(await page.locator('#plate_card').isHidden(), true);
+    await turns(page, run, 1);
+    await page.waitForFunction(() => document.title.startsWith('turning – '));
     assert.match(await page.locator('#run').innerText(), /^\d+\/20$/);
     assert.match(await page.locator('#clock').innerText(), /^\d\d:\d\d:\d\d$/);
   });

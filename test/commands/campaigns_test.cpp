@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "results/digest.hpp"
 #include "results/file_layer.hpp"
@@ -87,6 +88,32 @@ TEST_F(Campaigns, AreListedWithDatePropellerCoefficientAndVerdict) {
   EXPECT_EQ(told[0]["runs"], 5);
   EXPECT_EQ(told[0]["verdict"], "fly with care");
   EXPECT_NEAR(told[0]["K_T"].get<double>(), 1.55e-6, 0.03e-6);
+}
+
+TEST_F(Campaigns, OrWhatIsNoneAreNamedWithTheCommandThatTakesThem) {
+  const std::string run = (campaign_ / "runs/5x3_phi090_rep1.h5").string(), steps = (campaign_ / "steps.csv").string();
+  const std::string plan = (*parent_ / "campaign.yaml").string(), bench = (*parent_ / "bench.yaml").string();
+  const std::string vehicle = source_dir() + "/profiles/foldable_drone.yaml";
+  const TemporaryFolder folder;
+  const std::string log = (folder.path() / "log.csv").string(), out = (folder.path() / "out").string();
+  std::ofstream(log) << "RPM,Thrust (N)\n1000,0.1\n2000,0.4\n";
+  const std::vector<std::tuple<std::vector<std::string>, std::string, std::string>> mistakes{
+      {{"fit", run}, "this is a run file", "kphi info"},
+      {{"fit", plan}, "this is a campaign file", "kphi run"},
+      {{"fit", bench}, "this is a bench file", "kphi devices"},
+      {{"fit", log}, "neither steps of kphi nor a table of k", "kphi import"},
+      {{"export", plan, "--to", "c"}, "this is a campaign file", "kphi run"},
+      {{"export", vehicle, "--to", "c"}, "this is a vehicle file", "--vehicle"},
+      {{"compare", run, run}, "this is a run file", "kphi fit"},
+      {{"compensate", "--coefficients", plan, "--vehicle", vehicle}, "this is a campaign file", "kphi run"},
+      {{"replay", plan}, "this is a campaign file", "kphi run"},
+      {{"import", run, "--out", out}, "this is a run file", "kphi fit"},
+  };
+  for (const auto& [words, what, next] : mistakes) {
+    const Answer answer = say(words);
+    EXPECT_EQ(answer.code, 2) << words[0] << ' ' << words[1];
+    EXPECT_THAT(answer.err, testing::AllOf(HasSubstr(what), HasSubstr(next))) << words[0] << ' ' << words[1];
+  }
 }
 
 TEST_F(Campaigns, SayInEachOutputThatTheyAreSimulated) {

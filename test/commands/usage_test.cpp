@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <sstream>
+
 #include "commands/commands.hpp"
 
 namespace kphi::commands::usage_test {
@@ -43,6 +46,20 @@ TEST(Numbers, ThatAreNotFiniteAreNamed) {
   EXPECT_THAT(refusal({"spin", "--slew", "nan"}), testing::HasSubstr("--slew: nan is not a finite number"));
   EXPECT_THAT(refusal({"run", "nan"}), testing::HasSubstr("nan is not a finite number"));
   EXPECT_THAT(refusal({"spin", "--slew", "1e3"}), testing::Not(testing::HasSubstr("finite")));
+}
+
+TEST(Help, FitsEightyColumns) {
+  CLI::App program("kphi", "kphi");
+  program.formatter(narrow_help());
+  ExitCode exit_code = ExitCode::ok;
+  for (AddVerb* add : kVerbs) add(program, exit_code);
+  for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) {
+    std::istringstream help(verb->help());
+    for (std::string line; std::getline(help, line);) {
+      const auto width = std::ranges::count_if(line, [](unsigned char c) { return (c & 0xC0) != 0x80; });
+      EXPECT_LE(width, 80) << verb->get_name() << ": " << line;
+    }
+  }
 }
 
 }  // namespace kphi::commands::usage_test

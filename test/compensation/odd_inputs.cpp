@@ -78,7 +78,13 @@ Compensator compensator_of(int kind) {
 }
 
 void fly(Compensator& compensator, Mixer& mixer, const RotorLayout& good, Odd& odd) {
-  compensator.set_arms(odd.four<Radians>(), {Seconds(odd.next()), odd.four<RadPerSec>()});
+  if (odd.next() > 0) {
+    Rotors<HubPosition> hubs;
+    for (int i = 0; i < 4; ++i) hubs.add({Metres(odd.next()), Metres(odd.next())});
+    compensator.set_hubs(hubs, {Seconds(odd.next()), odd.four<Real>()});
+  } else {
+    compensator.set_arms(odd.four<Radians>(), {Seconds(odd.next()), odd.four<RadPerSec>()});
+  }
   (void)compensator.set_air_density_ratio(odd.next());
   const SpeedCommand command = compensator.speeds_for(odd.four<Newtons>());
   const Rotors<Newtons> uncovered = compensator.uncovered_thrusts(odd.four<Newtons>());

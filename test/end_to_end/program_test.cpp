@@ -154,7 +154,7 @@ TEST(Program, RunsOnWhereTheKeyOfTheSupplyIsDeadAndStopsWhereItSwitches) {
     write(bench.path("short.yaml"), short_campaign_text("0", 1, 6));
     if (!dead) (void)bench.fault("kind=supply_keys_free for_s=1000");
     EXPECT_THAT(ran({kphi(), "devices", "--bench", bench.path("bench.yaml")}).out,
-                HasSubstr(dead ? "its output key is no switch for you" : "this one says that it does not"));
+                HasSubstr(dead ? "its output key switches nothing" : "this one says that it does not"));
     Process run(bench.run_command());
     run.wait_for("step  1/");
     const double pressed_ms = bench.fault("kind=supply_key");

@@ -7,9 +7,9 @@
 #include "daq/campaign/campaign_run.hpp"
 #include "drivers/sim/physics/truth.hpp"
 #include "fit/model/identification.hpp"
-#include "fit/model/torque_power.hpp"
 #include "fit/signal/blade_pass.hpp"
 #include "fit/signal/dynamics.hpp"
+#include "fit/uncertainty/torque_coefficient.hpp"
 #include "results/reduction/reduction.hpp"
 #include "results/run_reader.hpp"
 #include "test/daq/bench_fixture.hpp"
@@ -176,19 +176,13 @@ TEST(Torque, IsFoundToOnePercent) {
     }
   }
   const Identification found = identify(steps);
-  std::vector<double> phis;
-  std::vector<Estimate> k;
-  for (const auto& row : found.table) {
-    phis.push_back(row.phi_deg);
-    k.push_back({row.k, row.standard_error, 4});
-  }
-  const auto torque = identify_torque(found.selection.used, phis, k);
+  const auto torque = torque_coefficients(found, {});
   ASSERT_EQ(torque.size(), 3u);
   for (const TorqueCoefficient& one : torque) {
     const double truth = sim::torque_coefficient(*sim::find_propeller("5x3"), one.phi_deg);
     EXPECT_NEAR(one.k_q.value / truth, 1, 0.01) << one.phi_deg;
   }
-  EXPECT_NEAR(torque[2].share, 0.96, 0.01);
+  EXPECT_NEAR(torque[2].share.value, 0.96, 0.01);
 }
 
 /// A motor of which every constant is known: 50 readings a second, at odd times.

@@ -59,5 +59,46 @@ TEST(ThousandCampaigns, CoverOnEightStands) {
   }
 }
 
+// "Fit to fly" says that the thrust is within 3 % at 95 %. No stand but the bent one is further off in 5 of 100
+// campaigns or more. The number of one with errors as they are assumed is 2.4 % and scatters: 3 % are within its reach.
+TEST(ThousandCampaigns, AreWithCareWhereItIsDeserved) {
+  constexpr unsigned kCampaigns = 1000;
+  struct Stand {
+    const char* name;
+    StudyTruth truth;
+    unsigned least_care, most_care;
+  };
+  StudyTruth assumed = without_kink();
+  assumed.between_runs = 0.005;
+  assumed.calibration = std::hypot(0.006, 0.002, 0.0009);
+  assumed.clock = 0.002;
+  StudyTruth bent = assumed;
+  bent.bend = 0.04;
+  for (const auto& [name, truth, least_care, most_care] :
+       {Stand{"quiet", without_kink(), 0, 50}, {"assumed sizes", assumed, 0, 100}, {"bent", bent, 950, 1000}}) {
+    unsigned wrong = 0, care = 0, held = 0;
+    double told = 0;
+    for (unsigned seed = 1; seed <= kCampaigns; ++seed) {
+      const StudyCampaign campaign = study_campaign(truth, 50000 + seed);
+      Identification found = identify(campaign.steps);
+      Analysis analysis = analyse(found, study_options(truth));
+      const Fitted fitted{std::move(found), std::move(analysis)};
+      const double air = campaign.density / kStandardDensity;
+      const double error = true_error(
+          fitted, [&, &truth = truth](double phi, double) { return std::min(truth.k(0), truth.k(phi)) * air; });
+      const FlightReadiness& flight = fitted.analysis.flight;
+      wrong += error > flight.limits.fit_to_fly ? 1 : 0;
+      care += flight.readiness() != Readiness::fit_to_fly ? 1 : 0;
+      held += error <= flight.error.share ? 1 : 0;
+      told += flight.error.share / kCampaigns;
+    }
+    fmt::print("{:<14} {} of {} are more than 3 % wrong, {} with care or less; number {:.2f} %, holds in {}\n", name,
+               wrong, kCampaigns, care, 100 * told, held);
+    EXPECT_GE(held, 0.936 * kCampaigns) << name;
+    EXPECT_GE(care, least_care) << name;
+    EXPECT_LE(care, most_care) << name;
+  }
+}
+
 }  // namespace coverage_long_test
 }  // namespace kphi::fit

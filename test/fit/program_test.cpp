@@ -184,6 +184,47 @@ TEST_F(FitProgram, ComparesLogsOverTheSpeedsOfBoth) {
   EXPECT_THAT(kphi({"compare", logs[0], steps("5x3")}).err, HasSubstr("not fitted yet"));
 }
 
+TEST_F(FitProgram, ComparesALogWithAFittedCampaignOverTheSpeedsOfBoth) {
+  StudyTruth rising;
+  rising.rise = 0.06;
+  rising.calibration = rising.density = rising.clock = 0;
+  const std::string campaign = (folder_ / "campaign").string(), log = (folder_ / "log").string();
+  auto all = study_campaign(rising, 7).steps;
+  std::filesystem::create_directories(campaign);
+  std::filesystem::create_directories(log);
+  results::write_steps(campaign + "/steps.csv", all);
+  std::erase_if(all, [](const results::StepMean& step) {
+    return step.occlusion_deg > 0 || to_rpm(RadPerSec(step.commanded_speed_rad_s)) > 9000;
+  });
+  results::write_steps(log + "/steps.csv", all);
+  ASSERT_EQ(kphi({"fit", campaign, "--no-report", "--accept"}).code, 0);
+  for (const auto& [a, b] :
+       {std::pair(log, campaign), std::pair(campaign, log), std::pair(log, campaign + "/coefficients.yaml")}) {
+    const Answer answer = kphi({"compare", a, b, "--json"});
+    ASSERT_EQ(answer.code, 0) << answer.err;
+    EXPECT_NEAR(json::parse(answer.out)["differences"][0]["share"].get<double>(), 0, 1e-9) << "the same steps";
+    EXPECT_THAT(answer.out, AllOf(HasSubstr("which both reached"), HasSubstr("its runs at 0° alone"),
+                                  Not(HasSubstr("different speeds"))));
+  }
+  std::filesystem::remove(campaign + "/steps.csv");
+  EXPECT_THAT(kphi({"compare", log, campaign}).out, HasSubstr("different speeds")) << "nothing left to fit again";
+}
+
+TEST_F(FitProgram, SaysByHowMuchTheThrustMayBeWrongWhereTheVehicleFlies) {
+  const std::string folder = steps("5x3"), drone = test::source_dir() + "/profiles/foldable_drone.yaml";
+  const auto says = AllOf(HasSubstr("thrust within"), HasSubstr("where foldable_drone flies, φ up to 65°"));
+  const Answer fitted = kphi({"fit", folder, "--no-report", "--vehicle", drone});
+  ASSERT_EQ(fitted.code, 0) << fitted.err;
+  EXPECT_THAT(fitted.err, says);
+  EXPECT_THAT(kphi({"check", folder + "/coefficients.yaml", drone}).out, says);
+  EXPECT_THAT(kphi({"compensate", "--coefficients", folder + "/coefficients.yaml", "--vehicle", drone}, "").err, says);
+  const Answer exported = kphi({"export", folder, "--to", "c", "--vehicle", drone});
+  EXPECT_EQ(exported.code, 0) << exported.err;
+  EXPECT_THAT(exported.err, says);
+  EXPECT_THAT(exported.out,
+              AllOf(HasSubstr("(95 %) where foldable_drone flies"), HasSubstr("torque per newton of thrust")));
+}
+
 TEST_F(FitProgram, RefusesWhatItCannotFitInOneLineWithTheNextMove) {
   const std::string empty = (folder_ / "empty").string();
   std::filesystem::create_directories(empty);

@@ -6,6 +6,7 @@ const kGap_s = 1;          // no line is drawn across a longer silence
 const kSilent_s = 1;       // without a tick from the runner: it is waiting
 const kMostLines = 500;
 const kNear = 0.9;         // of a limit
+const kAtRest_rpm = 50;    // slower: at rest
 
 const kMostGhost = 20000;  // points of one run
 const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
@@ -148,7 +149,7 @@ function drawSteps() {
   const room = Math.max(0.08 * (high - low), 0.01 * Math.abs(high)) || 1;
   charts.k.updateOptions({ file: rows.length > 1 ? rows : [rows[0], rows[0]], labels: ['x', ...angles.map(a => a + '°')],
     colors: paints, ...view('k', [0, 1.05 * rows[rows.length - 1][0]], [low - room, high + room]),
-    axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62, pixelsPerLabel: 24, axisLabelFormatter: axisOf(high - low + 2 * room) } } });
+    axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62, pixelsPerLabel: 16, axisLabelFormatter: axisOf(high - low + 2 * room) } } });
   at('k_keys').replaceChildren(...angles.map((angle, i) => {
     const key = document.createElement('span');
     key.className = 'key';
@@ -171,12 +172,13 @@ function showNumbers() {
   at('speed_beside').classList.toggle('off', turns && !state.ended && tick.speed_rpm !== null &&
     Math.abs(tick.speed_rpm - tick.commanded_rpm) > 0.05 * tick.commanded_rpm + 100);
   at('run_place').hidden = !tick.runs;
-  text('run', `${tick.run}/${tick.runs}`);
-  text('occlusion', fixed((state.question || tick).occlusion_deg, 0) + '°');
-  text('repetition', `${tick.repetition}/${tick.repetitions}`);
+  const next = state.question || tick;
+  text('run', `${next.run}/${Math.max(next.run, tick.runs)}`);
+  text('occlusion', fixed(next.occlusion_deg, 0) + '°');
+  text('repetition', `${next.repetition}/${Math.max(next.repetition, tick.repetitions)}`);
   const waits = state.question !== null || (tick.silent_s > kSilent_s && !state.ended);
   text('step', waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
-  text('step_word', waits ? 'terminal' : turns ? 'step' : '');
+  text('step_word', waits ? '' : turns ? 'step' : '');
   text('left', clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
@@ -193,13 +195,14 @@ function showFirstQuestion(question) {
   if (!question.has_power) text('supply', 'off');
 }
 
-/// Stale values are shown as '?' with their age; `none` says why there is no value yet. While a person is asked, the
-/// rotor is at rest, as kphi watches.
+/// A stale value is a '?' with its age; `none` is the reason why there is no value yet. While a person is asked, the
+/// rotor is at rest: kphi watches it. After the end nobody reads it.
 function showFigure(id, value, words, age_s, beside, none = '') {
   const silent_s = Math.max(age_s, state.tick.silent_s), asked = state.question !== null && !state.ended;
   const stale = !asked && !none && (value === null || state.tick.silent_s > kSilent_s);
   text(id, state.ended || none ? '–' : asked ? (id === 'speed' ? '0' : '–') : stale ? '?' : words(value));
-  text(id + '_beside', state.ended ? `run over, last value ${words(value)}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
+  const unseen = id === 'speed' && value > kAtRest_rpm ? ', not seen at rest' : '';
+  text(id + '_beside', state.ended ? `last value ${words(value)}${unseen}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
     : none || (stale ? `no reading for ${fixed(silent_s, 1)} s` : beside));
   at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
   at(id).closest('.figure').classList.toggle('over', state.ended);
@@ -289,7 +292,7 @@ function alarm() { if (tones) for (let i = 0; i < 6; ++i) tone(0.4 * i, i % 2 ? 
 
 /// As the state is.
 function showTitle() {
-  const { tick, hello } = state, turning = tick && (tick.step >= 0 || tick.speed_rpm > 50) && !state.question;
+  const { tick, hello } = state, turning = tick && (tick.step >= 0 || tick.speed_rpm > kAtRest_rpm) && !state.question;
   const words = !hello ? '' : state.ended ? (state.well ? 'finished – ' : 'STOPPED – ') : state.asked ? 'stopping – '
     : state.question ? 'waiting – ' : hello.replay ? 'replay – ' : turning ? 'turning – ' : '';
   const all = `${words}${hello ? hello.name : 'kphi'} – kphi`;

@@ -7,44 +7,17 @@
 extern "C" {
 #include "compensation/integrations/morphing_mixer.h"
 }
+#include "test/compensation/integrations/shipped_drone.hpp"
 
 namespace morphing_mixer_test {
 
-constexpr float kPi = 3.14159265F, kDrag = 0.0133F, kFastest = 2000.0F, kCoefficient = 1.55e-6F;
-constexpr float kFull = kCoefficient * kFastest * kFastest;
-constexpr float kX[4] = {kPi / 4, kPi / 4, kPi / 4, kPi / 4}, kO[4] = {kPi, kPi, kPi - 0.25F, kPi}, kStill[4] = {};
+using namespace shipped_drone;
 
 morphingVehicle_t vehicle() {
-  morphingVehicle_t made{};
-  made.airframe.half_side = 0.045F;
-  made.airframe.arm_length = 0.117F;
-  made.airframe.propeller_radius = 0.0635F;
-  made.airframe.fastest_speed = kFastest;
-  made.masses.body = 0.42F;
+  auto made = with_shipped_drone<morphingVehicle_t>();
   made.dragPerNewton = kDrag;
   made.fullThrust = kFull;
   made.thrustCurve = 1;
-  for (int i = 0; i < 4; ++i) {
-    made.airframe.hinge_turns[i] = i;
-    made.masses.at_hubs[i] = 0.045F;
-    made.spins[i] = i % 2 == 0 ? 1 : -1;
-    made.curves[i] = {kCoefficient,
-                      1.03F * kCoefficient,
-                      -0.1655F * kCoefficient,
-                      4.7F,
-                      KPHI_RIM_ARC,
-                      0,
-                      0,
-                      0,
-                      0,
-                      0,
-                      0,
-                      {},
-                      0,
-                      {},
-                      0,
-                      0};
-  }
   return made;
 }
 

@@ -9,47 +9,22 @@
 
 #include "compensation/integrations/px4_morphing_rotors.hpp"
 #include "control_allocator.hpp"
+#include "test/compensation/integrations/shipped_drone.hpp"
 
 namespace px4_test {
 
 using px4::Demand;
 using px4::Outputs;
 
-constexpr float kPi = 3.14159265F, kDrag = 0.0133F, kFastest = 2000.0F, kCoefficient = 1.55e-6F;
-constexpr float kFull = kCoefficient * kFastest * kFastest, kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kX[4] = {kPi / 4, kPi / 4, kPi / 4, kPi / 4}, kO[4] = {kPi, kPi, kPi - 0.25F, kPi}, kStill[4] = {};
+using namespace shipped_drone;
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 MorphingVehicle vehicle() {
-  MorphingVehicle made{};
-  made.airframe.half_side = 0.045F;
-  made.airframe.arm_length = 0.117F;
-  made.airframe.propeller_radius = 0.0635F;
-  made.airframe.fastest_speed = kFastest;
-  made.masses.body = 0.42F;
+  auto made = with_shipped_drone<MorphingVehicle>();
   made.full_thrust = kFull;
   made.drag_per_newton = kDrag;
-  for (int i = 0; i < 4; ++i) {
-    made.airframe.hinge_turns[i] = i;
-    made.masses.at_hubs[i] = 0.045F;
-    made.spins[i] = i % 2 == 0 ? 1 : -1;
-    made.reference[i] = kX[i];
-    made.curves[i] = {kCoefficient,
-                      1.03F * kCoefficient,
-                      -0.1655F * kCoefficient,
-                      4.7F,
-                      KPHI_RIM_ARC,
-                      0,
-                      0,
-                      0,
-                      0,
-                      0,
-                      0,
-                      {},
-                      0,
-                      {},
-                      0,
-                      0};
-  }
+  for (int i = 0; i < 4; ++i) made.reference[i] = kX[i];
   return made;
 }
 

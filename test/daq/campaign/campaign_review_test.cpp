@@ -10,6 +10,7 @@ using nlohmann::json;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 class OrderedCampaign : public CampaignOnBench {
  protected:
@@ -150,6 +151,54 @@ TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndKeepsIt) {
   EXPECT_EQ(journaled("another_run").at(0).at("decided"), true);
   EXPECT_THAT(said_.lines, Contains(HasSubstr("run  4/4  5x3_phi000_rep4.h5")));
   expect_whole();
+}
+
+/// What a person reads beside a campaign that takes ten minutes: each time that a number falls back, and no line was
+/// said since the last one.
+class WatchedProgress : public OrderedCampaign {
+ protected:
+  WatchedProgress() {
+    said_.at_tick = [this](const Position& at, const Observation&) {
+      const bool falls = at.done < done_ || at.run < run_ || at.remaining_s > left_s_ + 1e-6;
+      if (falls && said_.lines.size() == lines_)
+        fallen_.push_back(fmt::format("run {}: {:.4f} to {:.4f}, {:.1f} to {:.1f} s left", at.run, done_, at.done,
+                                      left_s_, at.remaining_s));
+      done_ = at.done, run_ = at.run, left_s_ = at.remaining_s, lines_ = said_.lines.size(), ++ticks_;
+    };
+  }
+  void expect_no_fall() const {
+    EXPECT_THAT(fallen_, IsEmpty());
+    EXPECT_GT(ticks_, 1000);
+    EXPECT_NEAR(done_, 1, 1e-9) << "the end is the end";
+  }
+  double done_ = 0, left_s_ = 1e9;
+  int run_ = 0, ticks_ = 0;
+  std::size_t lines_ = 0;
+  std::vector<std::string> fallen_;
+};
+
+TEST_F(WatchedProgress, NeverFallsBackInAPlainCampaign) {
+  EXPECT_EQ(run(campaign("0, 90", 2, "")).runs, 4);
+  expect_no_fall();
+}
+
+TEST_F(WatchedProgress, FallsWithAWordWhenARunIsAdded) {
+  spoil_second_run();
+  EXPECT_EQ(run(campaign("0", 3, "")).runs, 4);
+  expect_no_fall();
+  EXPECT_THAT(said_.lines, Contains(HasSubstr("time left: "))) << "it says that it grew";
+}
+
+TEST_F(WatchedProgress, NeverFallsBackWhereStepsEndByThemselves) {
+  auto until = campaign("0, 90", 2, "");
+  until.profile.until = profiles::Until{0.002, Seconds(0.9)};
+  EXPECT_EQ(run(until).runs, 4);
+  expect_no_fall();
+}
+
+TEST_F(WatchedProgress, NeverFallsBackWithReferenceRuns) {
+  EXPECT_EQ(run(campaign("90", 2, "order: {reference: true}\n")).runs, 4);
+  expect_no_fall();
 }
 
 TEST_F(OrderedCampaign, DoesNotRunAgainWhenThePersonOrTheCampaignSaysNo) {

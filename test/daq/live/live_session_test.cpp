@@ -71,17 +71,26 @@ TEST_F(LiveProgressOf, TellsTheTerminalAllTheSameAndPassesOnWhatIsSaid) {
 }
 
 TEST_F(LiveProgressOf, PassesOnWhatAPersonIsAsked) {
-  progress_.asks({"Mount 45°, then type 45.", 45, false, "<svg/>"});
+  progress_.asks({"Mount 45°, then type 45.", 45, 2, 5, false, "<svg/>"});
   progress_.asks({});
   const std::vector<json> told = messages();
   ASSERT_EQ(told.size(), 2u);
   EXPECT_EQ(told[0], json({{"type", "ask"},
                            {"text", "Mount 45°, then type 45."},
                            {"occlusion_deg", 45.0},
+                           {"repetition", 2},
+                           {"run", 5},
+                           {"repetition", 2},
+                           {"run", 5},
                            {"has_power", false},
                            {"drawing", "<svg/>"}}));
-  EXPECT_EQ(told[1],
-            json({{"type", "ask"}, {"text", ""}, {"occlusion_deg", 0.0}, {"has_power", true}, {"drawing", ""}}));
+  EXPECT_EQ(told[1], json({{"type", "ask"},
+                           {"text", ""},
+                           {"occlusion_deg", 0.0},
+                           {"repetition", 0},
+                           {"run", 0},
+                           {"has_power", true},
+                           {"drawing", ""}}));
   EXPECT_THAT(told_.questions, ElementsAre("Mount 45°, then type 45.", ""));
 }
 

@@ -9,7 +9,9 @@
 
 #include "base/error.hpp"
 #include "compensation/file/coefficient_file.hpp"
+#include "fit/coefficients/error_in_flight.hpp"
 #include "fit/uncertainty/analysis.hpp"
+#include "profiles/vehicle.hpp"
 #include "test/fit/bench_study.hpp"
 #include "test/fit/campaign_steps.hpp"
 #include "test/source_dir.hpp"
@@ -145,6 +147,61 @@ TEST(Coefficients, HaveExactlyTheKeysOfTheReadme) {
     collect_keys(YAML::Load(format_coefficients(analysed(fit), all)), "", written);
   }
   EXPECT_EQ(written, keys_in_readme());
+}
+
+/// With arms that turn this far, and these speeds.
+profiles::Vehicle vehicle(double arm_to_deg, double from_rpm_, double to_rpm_) {
+  profiles::Vehicle drone = profiles::load_vehicle(test::source_dir() + "/profiles/foldable_drone.yaml");
+  drone.arm_angle_max = from_degrees(arm_to_deg);
+  drone.arm_angle_min = from_degrees(0);
+  drone.speed_min = from_rpm(from_rpm_);
+  drone.speed_max = from_rpm(to_rpm_);
+  return drone;
+}
+
+TEST(ErrorInFlight, IsThatOfTheVerdictForThePhiAndSpeedsOfTheVehicleAlone) {
+  const auto fitted = analysed(identify(study_campaign({.rise = 0.15}, 4).steps));
+  const auto file = compensation::parse_coefficients(format_coefficients(fitted, provenance()), "k.yaml");
+  ASSERT_FALSE(file.thrust_error_within.rows.empty());
+  EXPECT_NEAR(file.thrust_error_within.rows.back().shares.back(), *file.thrust_error.share_95, 1e-4)
+      << "all that the fit claims";
+  const auto of = [&](const profiles::Vehicle& drone) { return error_in_flight(file, drone).value(); };
+  const ErrorInFlight whole = of(vehicle(180, 3000, 19100)), open = of(vehicle(90, 3000, 19100)),
+                      hover = of(vehicle(90, 12000, 16000));
+  EXPECT_NEAR(whole.phi_deg, 65, 1) << "as the vehicle file says";
+  EXPECT_EQ(open.phi_deg, 0);
+  EXPECT_LE(whole.share, *file.thrust_error.share_95 + 1e-4);
+  EXPECT_LT(open.share, whole.share);
+  EXPECT_LT(hover.share, open.share) << "k of this propeller depends on the speed";
+  EXPECT_THAT(words(hover, vehicle(90, 12000, 16000)),
+              HasSubstr("% (95 %) where foldable_drone flies, φ up to 0°, 12000 to 16000 RPM"));
+  EXPECT_THAT(words(of(vehicle(90, 0, 25000)), vehicle(90, 0, 25000)), HasSubstr("of its 0 to 25000 RPM what was"));
+}
+
+TEST(ErrorInFlight, IsUnknownWhereNobodyMeasured) {
+  auto steps = study_campaign({}, 4).steps;
+  for (auto& step : steps) step.occlusion_deg /= 9;  // up to 30°
+  auto file = compensation::parse_coefficients(format_coefficients(analysed(identify(steps)), provenance()), "k.yaml");
+  const profiles::Vehicle drone = vehicle(180, 3000, 19100);
+  const auto error = error_in_flight(file, drone);
+  ASSERT_TRUE(error);
+  EXPECT_TRUE(std::isnan(error->share));
+  EXPECT_EQ(error->readiness, Readiness::not_yet);
+  EXPECT_THAT(words(*error, drone), HasSubstr("reaches φ 65°, beyond the widest"));
+  file.thrust_error_within = {};
+  EXPECT_FALSE(error_in_flight(file, drone)) << "an older file does not tell";
+}
+
+TEST(ErrorInFlight, IsNoBetterThanTheDoubtsOfTheFile) {
+  auto steps = study_campaign(without_kink(), 4).steps;
+  const auto verdict = [&] {
+    const auto file =
+        compensation::parse_coefficients(format_coefficients(analysed(identify(steps)), provenance()), "k.yaml");
+    return error_in_flight(file, vehicle(90, 9000, 16000))->readiness;
+  };
+  EXPECT_EQ(verdict(), Readiness::fit_to_fly);
+  for (auto& step : steps) step.torque_nm *= 0.1;
+  EXPECT_EQ(verdict(), Readiness::not_yet) << "no propeller makes this thrust of that power";
 }
 
 class RecordedFitTest : public ::testing::Test {

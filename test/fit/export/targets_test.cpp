@@ -272,6 +272,7 @@ TEST(Ros2, HasTheKnotsOfATable) {
 TEST(Targets, SayThatTheyDropAChangeOfKWithTheSpeed) {
   compensation::Coefficients bent = coefficients();
   ASSERT_TRUE(bent.curve.set_speed_trend({1e-4, RadPerSec(1500)}));
+  bent.throttle = with_throttle(0.35, 0.5, 55, {-0.02, 0.06, -0.01, 0.005}).throttle;
   const std::set<std::string> constant{"agilicious", "gazebo", "ardupilot"};
   for (const Target& target : targets()) {
     const Export made = target.write(bent, {.vehicle = &drone()});
@@ -298,12 +299,14 @@ TEST(Targets, SayWhatTheyCannotHold) {
   for (const Target& target : targets()) {
     SCOPED_TRACE(target.name);
     EXPECT_TRUE(names.insert(target.name).second);
-    const Export result = target.write(file(), {.vehicle = &drone()});
+    const Export result =
+        target.write(with_throttle(0.35, 0.5, 55, {-0.02, 0.06, -0.01, 0.005}), {.vehicle = &drone()});
     EXPECT_FALSE(result.text.empty());
     EXPECT_FALSE(result.lost.empty());
     for (const std::string& reason : result.lost) EXPECT_THAT(reason, HasSubstr(": ")) << "what, and why";
   }
-  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "c", "ardupilot", "csv", "mcap"}));
+  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "c", "ardupilot", "betaflight",
+                                          "crazyflie", "csv", "mcap"}));
 }
 
 TEST(Targets, RefuseAnOcclusionThatWasNotMeasured) {

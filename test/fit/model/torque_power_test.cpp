@@ -34,10 +34,10 @@ TEST(DragTorque, HasAnUncertaintyOfItsOwnThatItsScatterBearsOut) {
       one.thrust_u_n = one.zero_u_n = one.zero_moved_n = 0.01;  // N, of the thrust
     }
     const Identification campaign = identify(steps);
-    const auto torque = analyse(campaign).torque;
+    const auto torque = torque_coefficients(campaign, BenchUncertainty::none());
     ASSERT_EQ(torque.size(), 5u);
     found.push_back(torque[0].k_q.value);
-    told.push_back(torque[0].k_q.u);
+    told.push_back(torque[0].k_q.combined());
   }
   const auto mean = [](const std::vector<double>& all) { return std::accumulate(all.begin(), all.end(), 0.0) / 200; };
   double squares = 0;

@@ -99,7 +99,7 @@ TEST(Choices, WithoutAWishTellOfTheCampaignAsItIs) {
   EXPECT_TRUE(found.choices.empty());
   const std::string text = answer_text(asked, found);
   for (const char* part :
-       {"K_T ±", "slope ±", "k(135) ±", "written", "limited by mounting", "31.0", "3 x 0 45 90 180 270"})
+       {"K_T ±", "slope ±", "k(135) ±", "written", "limited by mounting", "31.9", "3 x 0 45 90 180 270"})
     EXPECT_THAT(text, HasSubstr(part));
   const auto json = nlohmann::json::parse(answer_json(asked, found));
   EXPECT_EQ(json["as_written"]["runs"], 15);

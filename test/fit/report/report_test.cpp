@@ -114,6 +114,7 @@ TEST(Html, SetsWhatPlainTextWritesInAscii) {
   EXPECT_EQ(typeset("K_T: T = k w^2 at phi = 45 deg, 1e-8 N/RPM^2 <b>"),
             "K<sub>T</sub>: T = k ω² at φ = 45°, 1e-8 N/RPM² &lt;b&gt;");
   EXPECT_EQ(typeset("many degrees of Delphi"), "many degrees of Delphi");
+  EXPECT_EQ(typeset("5x3_phi000_rep1.h5 at phi"), "5x3_phi000_rep1.h5 at φ") << "names of files stay as they are";
 }
 
 TEST(Html, WritesPowersOfTenAsPeopleDoAndTheDigitsThatTheErrorAllows) {

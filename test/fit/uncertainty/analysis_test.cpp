@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "compensation/file/coefficient_file.hpp"
 #include "fit/coefficients/coefficients.hpp"
@@ -114,11 +115,40 @@ TEST_F(StudyAnalysis, TorqueFollowsTheSameEstimators) {
   ASSERT_EQ(analysis.torque.size(), 5u);
   for (std::size_t i = 0; i < 5; ++i)
     EXPECT_NEAR(analysis.torque[i].drag_per_thrust_m.value, 0.013, 4 * analysis.torque[i].drag_per_thrust_m.u + 1e-5);
-  EXPECT_EQ(analysis.torque[0].share, 1);
-  EXPECT_LT(analysis.torque[4].share, 0.3);
-  const auto relative = [](const Estimate& k_q) { return k_q.u / k_q.value; };
-  EXPECT_NEAR(analysis.torque[4].share_u / analysis.torque[4].share,
-              std::hypot(relative(analysis.torque[4].k_q), relative(analysis.torque[0].k_q)), 1e-12);
+  EXPECT_EQ(analysis.torque[0].share.value, 1);
+  EXPECT_LT(analysis.torque[4].share.value, 0.3);
+}
+
+double u_share(const Budget& budget) { return budget.combined() / budget.value; }
+double u_share(const Estimate& estimate) { return estimate.u / estimate.value; }
+
+TEST(TorqueCoefficient, HasTheErrorsOfTheStandAndItsRatiosOnlyThoseThatDoNotCancel) {
+  const Identification found = identify(study_campaign({}, 7).steps);
+  const auto with = [&](BenchUncertainty bench) { return torque_coefficients(found, bench).back(); };
+  BenchUncertainty none = BenchUncertainty::none(), clock = none, cell = none, mounting = none;
+  const TorqueCoefficient quiet = with(none);
+  clock.motor_clock = 0.01;
+  EXPECT_NEAR(u_share(with(clock).k_q), std::hypot(u_share(quiet.k_q), 0.02), 1e-9);
+  EXPECT_NEAR(u_share(with(clock).share), u_share(quiet.share), 1e-9);
+  EXPECT_NEAR(u_share(with(clock).drag_per_thrust_m), u_share(quiet.drag_per_thrust_m), 1e-9)
+      << "thrust and torque belong to the same speed";
+  cell.cell_calibration = 0.01;
+  EXPECT_NEAR(u_share(with(cell).share), u_share(quiet.share), 1e-9);
+  EXPECT_NEAR(u_share(with(cell).drag_per_thrust_m),
+              std::hypot(u_share(quiet.drag_per_thrust_m), 0.01 * std::numbers::sqrt2), 1e-9)
+      << "one axis each";
+  cell.calibration_note = "weighed";
+  cell.cell_calibration = 1e-4;
+  EXPECT_NEAR(u_share(with(cell).k_q), std::hypot(u_share(quiet.k_q), 0.006), 1e-9)
+      << "a weight hangs on the thrust's axis; the torque's is assumed";
+}
+
+TEST(TorqueCoefficient, OfOneRunEachDoesNotKnowItsZero) {
+  auto steps = study_campaign({}, 7).steps;
+  std::erase_if(steps, [](const auto& step) { return step.repetition > 1; });
+  const auto torque = torque_coefficients(identify(steps), {});
+  EXPECT_THAT(torque.front().k_q.not_known(), ::testing::ElementsAre("zero"));
+  EXPECT_THAT(torque.front().k_q.assumed(), ::testing::Contains("repetitions"));
 }
 
 TEST(Analysis, OneRunEachTakesTheUsualScatterOfMountings) {

@@ -73,7 +73,7 @@ TEST(ModbusScanner, GivesUpAStreamThatIsNotModbus) {
   }
 }
 
-/// Of the keypad: wildekek/rdtech-esphome issue 1, rfinnie/rdserialtool issue 5.
+/// As owners report of these supplies: a host that asks locks the keypad, and writing to register 15 does not free it.
 TEST(SupplySlave, OfARidenLocksItsKeypadWhileItIsAskedAndNoWriteFreesIt) {
   SupplySettings settings;
   settings.faults = {{.kind = FaultKind::supply_key, .at = 1s, .count = 1},
@@ -179,6 +179,7 @@ TEST(SimulatedRiden, AnswersInTheKnownFrames) {
   supply.spoil(FaultKind::supply_reads_as, 10, 1198);
   supply.spoil(FaultKind::supply_reads_as, 11, 1234);
   supply.spoil(FaultKind::supply_reads_as, 13, 1478);
+  supply.spoil(FaultKind::supply_reads_as, 15, 0);  // these frames are of a keypad that is free
   EXPECT_EQ(supply.raw(bytes("01 06 00 12 00 01 E8 0F")), hex("01 06 00 12 00 01 E8 0F"));
   EXPECT_EQ(supply.raw(bytes("01 03 00 08 00 0D 05 CD")),
             hex("01 03 1A 04 B0 13 88 04 AE 04 D2 00 00 05 C6 09 65 00 00 00 00 00 00 00 01 00 00 00 00 1E B6"));
