@@ -1,11 +1,16 @@
 #!/bin/sh
-# kphi.1, and kphi-VERB.1 of every verb, by what --help says. PROGRAM HELP2MAN FOLDER
+# kphi.1, and kphi-VERB.1 of every verb, by what --help says. PROGRAM HELP2MAN FOLDER [EMULATOR of its processor]
 set -eu
 program=$1 help2man=$2 folder=$3
 rm -rf "$folder"
 mkdir -p "$folder"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+if [ $# -gt 3 ]; then
+  printf '#!/bin/sh\nexec %s "%s" "$@"\n' "$4" "$1" >"$work/kphi"
+  chmod +x "$work/kphi"
+  program=$work/kphi
+fi
 export LC_ALL=C.UTF-8
 verbs=$("$program" completion bash | sed -n 's/.*words="\(init [^"]*\) help".*/\1/p')
 page() { # name, command, what it is, see also

@@ -3,26 +3,12 @@
 # user in dialout, the library found by a compiler, and nothing left after a purge. As root: FOLDER_OF_PACKAGES [MIRROR]
 set -eu
 packages=$(readlink -f "$1") mirror=${2:-}
+. "$(dirname "$0")/fresh_debian.sh"
 root=$(mktemp -d /var/tmp/kphi-try.XXXXXX)
 chmod 755 "$root"
-cleanup() {
-  umount "$root/proc" 2>/dev/null || true
-  umount -R "$root/dev" 2>/dev/null || true
-  rm -rf --one-file-system "$root"
-}
-trap cleanup EXIT
-# shellcheck disable=SC2086
-debootstrap --variant=minbase bookworm "$root" $mirror >"$root.log" 2>&1 || { tail "$root.log" >&2; exit 1; }
-rm -f "$root.log"
-mount -t proc proc "$root/proc"
-mount --rbind /dev "$root/dev"
-mount --make-rslave "$root/dev"
-for list in /etc/apt/sources.list /etc/apt/sources.list.d /etc/apt/apt.conf.d /etc/apt/auth.conf.d /etc/ssl/certs; do
-  if [ -e "$list" ]; then rm -rf "${root:?}$list"; cp -rLf "$list" "$root$(dirname "$list")/" 2>/dev/null || true; fi
-done
-[ -e /etc/apt/sources.list ] || rm -f "$root/etc/apt/sources.list"
-cp -f /etc/resolv.conf "$root/etc/resolv.conf" 2>/dev/null || true
-inside() { chroot "$root" /bin/sh -ec "$1"; }
+trap 'leave_debian "$root"; rm -rf --one-file-system "$root"' EXIT
+make_debian "$root" "$mirror"
+enter_debian "$root"
 inside 'apt-get update -q >/dev/null'
 # What was there before, to find what a purge leaves.
 listing() { (cd "$root" && find etc usr var/lib -xdev -path 'usr/share/man' -prune -o -name '*kphi*' -print | sort); }
