@@ -145,7 +145,9 @@ TEST_F(ScpiSupplyTest, TakesZeroWithoutACommaForNoError) {
 
 TEST_F(ScpiSupplyTest, IsServedWithoutTheQueriesThatManyMakesLack) {
   for (const char* query : {"VOLT:PROT:TRIP?", "CURR:PROT:TRIP?", "STAT:QUES:COND?"}) line.answers.erase(query);
+  line.answers["SYST:ERR?"] = "-113,\"Undefined header\"";
   ScpiSupply supply(lend(line), clock);
+  line.answers["SYST:ERR?"] = "0,\"No error\"";
   EXPECT_EQ(supply.identity().untold, "VOLT:PROT:TRIP?, CURR:PROT:TRIP?, STAT:QUES:COND?");
   supply.apply(kTwelveVolts);
   const SupplyReading reading = supply.read([] {});
@@ -153,6 +155,11 @@ TEST_F(ScpiSupplyTest, IsServedWithoutTheQueriesThatManyMakesLack) {
   EXPECT_EQ(reading.protection, SupplyProtection::none);
   EXPECT_DOUBLE_EQ(reading.voltage_v, 11.98);
   supply.switch_off();
+}
+
+TEST_F(ScpiSupplyTest, IsNotTakenForOneWithoutAQueryWhereItWasTooSlow) {
+  line.answers.erase("VOLT:PROT:TRIP?");
+  EXPECT_THAT(refusal([](ScpiSupply&) {}), HasSubstr("no answer in time"));
 }
 
 TEST_F(ScpiSupplyTest, IsOffWhenItSaysSoWhateverItsErrorsAre) {
