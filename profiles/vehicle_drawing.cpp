@@ -74,7 +74,7 @@ Frame frame_of(const Vehicle& vehicle) {
   return frame;
 }
 
-constexpr int kSide = 230, kCaption = 34;
+constexpr int kSide = 230, kNose = 16, kCaption = 34;
 
 /// One shape in a square of kSide, the caption below it; units of the picture, x to the right, y down.
 class ShapePicture {
@@ -90,7 +90,7 @@ class ShapePicture {
     const auto hubs = hubs_of(vehicle_, shape_);
     const auto occlusions = occlusions_of(vehicle_, shape_);
     for (std::size_t i = 0; i < hubs.size(); ++i) drawn += rotor(i, place_of(hubs[i]), occlusions[i]);
-    drawn += fmt::format("<path d=\"M0,{0:.1f} l-6,12 h12 Z\"/>\n", -0.5 * kSide);
+    drawn += fmt::format("<path d=\"M0,{:.1f} l-6,12 h12 Z\"/>\n", -0.5 * kSide - kNose + 1);
     return drawn + fmt::format("<text y=\"{:g}\" text-anchor=\"middle\" font-size=\"16\">{}</text>\n",
                                0.5 * kSide + 0.6 * kCaption, shape_);
   }
@@ -192,13 +192,13 @@ std::string draw_shapes(const Vehicle& vehicle) {
   std::string drawn;
   for (std::size_t i = 0; i < shapes.size(); ++i)
     drawn += fmt::format("<g transform=\"translate({:g},{:g})\">\n{}</g>\n", kSide * (static_cast<double>(i) + 0.5),
-                         0.5 * kSide, ShapePicture(vehicle, frame, shapes[i], i).drawn());
+                         kNose + 0.5 * kSide, ShapePicture(vehicle, frame, shapes[i], i).drawn());
   const std::string title =
       "The vehicle from above in its shapes: body, arms, disks dashed, what the body covers of them";
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"{2}\" fill=\"currentColor\" font-family=\"sans-serif\">\n<title>{2}</title>\n{3}</svg>\n",
-      kSide * static_cast<int>(shapes.size()), kSide + kCaption, title, drawn);
+      kSide * static_cast<int>(shapes.size()), kNose + kSide + kCaption, title, drawn);
 }
 
 std::vector<std::string> shapes_in_characters(const Vehicle& vehicle) {

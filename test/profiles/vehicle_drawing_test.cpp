@@ -55,18 +55,21 @@ TEST(VehicleDrawing, ClipsEachCoveredPartByADiskOfItsOwn) {
   }
 }
 
-TEST(VehicleDrawing, InCharactersCoversAsMuchOfTheDisksAsTheGeometry) {
-  const Vehicle drone = shipped("foldable_drone.yaml");
-  const auto lines = shapes_in_characters(drone);
+std::string joined(const std::vector<std::string>& lines) {
   std::string all;
-  for (const std::string& line : lines) {
-    EXPECT_LE(line.size(), 78u);
-    all += line + "\n";
-  }
-  for (const char hub : {'1', '2', '3', '4'}) EXPECT_EQ(std::ranges::count(all, hub), 4) << hub << ", once a shape";
-  EXPECT_GT(std::ranges::count(all, '#'), 0);
-  const Vehicle hexa = shipped("foldable_hexa.yaml");
-  EXPECT_GE(std::ranges::count(shapes_in_characters(hexa).front(), '.'), 0);
+  for (const std::string& line : lines) all += line + "\n";
+  return all;
+}
+
+TEST(VehicleDrawing, InCharactersMarksEachHubOnceAShapeAndCoversInOAlone) {
+  const auto lines = shapes_in_characters(shipped("foldable_drone.yaml"));  // H and O, below them T and X
+  for (const std::string& line : lines) EXPECT_LE(line.size(), 78u);
+  for (const char hub : {'1', '2', '3', '4'}) EXPECT_EQ(std::ranges::count(joined(lines), hub), 4) << hub;
+  const auto half = lines.begin() + static_cast<std::ptrdiff_t>(lines.size() / 2);
+  EXPECT_GT(std::ranges::count(joined({lines.begin(), half}), '#'), 5);
+  EXPECT_EQ(std::ranges::count(joined({half, lines.end()}), '#'), 0);
+  for (const char hub : {'5', '6'})
+    EXPECT_EQ(std::ranges::count(joined(shapes_in_characters(shipped("foldable_hexa.yaml"))), hub), 3) << hub;
 }
 
 TEST(VehicleDrawing, PutsTheNoseUpAndTheLeftToTheLeft) {
@@ -78,6 +81,11 @@ TEST(VehicleDrawing, PutsTheNoseUpAndTheLeftToTheLeft) {
   const auto column_of = [&](char hub) { return lines.at(static_cast<std::size_t>(row_of(hub))).find(hub); };
   EXPECT_LT(row_of('1'), row_of('2'));
   EXPECT_LT(column_of('1'), column_of('4'));
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_string(draw_shapes(shipped("telescoping_quad.yaml")).c_str()));
+  const auto hub = document.select_node("//circle[@class='disk']").node();
+  EXPECT_LT(hub.attribute("cx").as_double(), 0);
+  EXPECT_LT(hub.attribute("cy").as_double(), 0);
 }
 
 }  // namespace vehicle_drawing_test
