@@ -121,7 +121,10 @@ TEST(ModuleProbe, ReadsAWholeAudit) {
   });
   const Probe found = probe({line.device(), 115200, 0}, kClock);
   ASSERT_TRUE(found.answers());
-  EXPECT_EQ(found.counters.timeouts, 0u);
+  for (const Entry& entry : kEntries) {
+    const bool older = entry.type == Client::temperature_estimator;  // is asked where the newer one does not answer
+    if (entry.audited && !older) EXPECT_TRUE(found.record->values.count(&entry)) << entry.path;
+  }
   EXPECT_EQ(found.record->uid(), "111111112222222233333333");
   EXPECT_EQ(found.record->firmware()->text(), "speed 0.0.32");
   EXPECT_EQ(found.record->coil_temperature_client(), 83);
