@@ -12,7 +12,8 @@ namespace kphi::profiles {
 
 /// Follows one run, for a profile with `until`. k = Σ x T / Σ x² with x = ω², so its variance is Σ x² u² / (Σ x²)² over
 /// the steps that are held; noise may take half of the interval that is wanted. What one step leaves of that, the later
-/// ones may use. Decides by uncertainties alone, never by how well a thrust fits: so it does not bias k.
+/// ones may use (science.md, eq. 31). Decides by uncertainties alone, never by how well a thrust fits: so it does not
+/// bias k.
 class RunCertainty {
  public:
   /// A run of fewer steps leaves none out.

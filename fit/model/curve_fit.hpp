@@ -41,7 +41,8 @@ struct Curvature {
 };
 
 /// Tests whether k(φ) is a line, by the `points` that carry it (with φ = 0 if anchored) and their standard errors;
-/// `freedom` of the variance behind those errors. Needs 3 points; with 3 the two tests are the same.
+/// `freedom` of the variance behind those errors. Needs 3 points; with 3 the two tests are the same. science.md,
+/// eq. 21.
 [[nodiscard]] Curvature curvature(std::span<const CurvePoint> points, double freedom);
 
 struct CurveOptions {

@@ -3,7 +3,7 @@
 // By default it goes freely through the occluded points, φ > 0, and K_T = k(0) is separate. φ = 0 is not collinear with
 // them: the paper's own numbers (1, 0.90 at 45°, 0.25 at 270°) have slope −0.22 %/° up to 45° and −0.29 %/° beyond, so
 // a line pulled to K_T would miss every occluded point. Anchored, the line starts at K_T: k does not jump at first
-// contact, but the residual is larger. docs/science.md says how it is fitted.
+// contact, but the residual is larger. science.md, eq. 19 and 20.
 #include <fmt/format.h>
 
 #include <algorithm>

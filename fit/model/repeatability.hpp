@@ -51,9 +51,9 @@ struct WithinRuns {
 [[nodiscard]] std::vector<RunSums> sums_of_runs(double phi_deg, std::span<const results::StepMean> steps,
                                                 const ThrustFit& fit, double k, const results::ZeroMovement& movement);
 
-/// From the interaction of step and repetition, which contains neither errors of whole runs, in proportion or in
-/// newtons, nor of the map; from the residuals of a single run. Each step counts by its own scatter (MacKinnon, White
-/// 1985), since thrust scatters more where it is high.
+/// science.md, eq. 13. From the interaction of step and repetition, which contains neither errors of whole runs, in
+/// proportion or in newtons, nor of the map; from the residuals of a single run. Each step counts by its own scatter
+/// (MacKinnon, White 1985), since thrust scatters more where it is high.
 [[nodiscard]] WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
                                              std::span<const RunSums> runs);
 
@@ -79,7 +79,7 @@ struct Repeatability {
   bool mounting_assumed = false;     ///< nobody gave it
   Estimate zero_movement{};          ///< of a run's zero, usually, N; freedom: the runs behind it
 
-  /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)².
+  /// Of k at angle i, from all errors that are independent from φ to φ, N/(rad/s)²; science.md, eq. 17.
   [[nodiscard]] double independent_u(std::size_t i) const;
   /// Degrees of freedom of the zero, which all φ share; 0: endless.
   [[nodiscard]] double freedom_of_zero() const;

@@ -1,6 +1,6 @@
 // The table k(φ): K_T, and one k for each occlusion, straight between them; for a propeller whose k(φ) is not a line.
 // k falls or stays: where noise makes it rise, neighbours share their weighted mean (isotonic regression: Barlow et
-// al., Statistical Inference under Order Restrictions, 1972), and none is above K_T.
+// al., Statistical Inference under Order Restrictions, 1972), and none is above K_T. Between them: science.md, eq. 22.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Least squares of thrust on squared speed: one propeller, one occlusion, one k.
+// Least squares of thrust on squared speed: one propeller, one occlusion, one k (science.md, eq. 1 and 12).
 //
 // T is fitted on ω²; T/ω² is never averaged over the steps, because at low speed thrust is under the load cell's noise
 // and such an average gives that noise the largest weight.

@@ -1,4 +1,4 @@
-// What thrust costs: torque, Q = k_Q(φ) ω², and electrical power.
+// What thrust costs: torque, Q = k_Q(φ) ω² (science.md, eq. 1), and electrical power.
 #pragma once
 
 #include <optional>

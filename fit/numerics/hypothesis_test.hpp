@@ -40,7 +40,7 @@ struct Estimate {
 /// F test; `value` is a ratio of mean squares.
 [[nodiscard]] HypothesisTest f_test(double value, double freedom, double error_freedom);
 
-/// a − b of independent estimates, degrees of freedom by Welch-Satterthwaite.
+/// a − b of independent estimates, degrees of freedom by Welch-Satterthwaite (science.md, eq. 18).
 [[nodiscard]] Estimate difference(const Estimate& a, const Estimate& b);
 
 /// Holm's procedure: of several tests those with p below this fall, so that one of true hypotheses falls by chance in

@@ -1,4 +1,4 @@
-// Robust losses: how much a point far from a fit may pull at it.
+// Robust losses: how much a point far from a fit may pull at it (ρ of science.md, eq. 19).
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 // Noise that remembers: its correlation falls as exp(-t/τ) (a first-order autoregression, G. Box, G. Jenkins, Time
-// series analysis, 3.2). What a mean over a window keeps of it, and how alike the means of neighbouring steps are.
+// series analysis, 3.2; science.md, eq. 29). What a mean over a window keeps of it, and how alike the means of
+// neighbouring steps are.
 #pragma once
 
 namespace kphi::fit {

@@ -44,7 +44,7 @@ class Prediction {
   /// Its value and, row by row, its uncertainty. Throws ConfigurationError for a φ beyond the widest occlusion.
   [[nodiscard]] Budget of(const Wanted& wanted) const;
   /// Bend of k(φ), as a share of K_T at half of the range, that its test will find in about 19 of 20 campaigns;
-  /// infinite with two occlusions.
+  /// infinite with two occlusions. science.md, eq. 30.
   [[nodiscard]] double bend_seen() const;
 
  private:

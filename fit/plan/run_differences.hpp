@@ -1,5 +1,5 @@
 // The repetitions of one occlusion against each other, step by step: each run differs from their mean by a factor
-// (mounting, air), a zero, and the noise of its steps.
+// (mounting, air), a zero, and the noise of its steps, whose memory is that of science.md, eq. 29.
 #pragma once
 
 #include <span>

@@ -1,6 +1,6 @@
 // What a stand does to the k of a run, from one pilot campaign or several, or as stated: noise and its memory, zero and
 // its wander, scatter from run to run and from mounting to mounting, what the model lacks. Enough to say how certain
-// another campaign will be before it is run.
+// another campaign will be before it is run. Its memories are those of science.md, eq. 29.
 #pragma once
 
 #include <limits>

@@ -1,4 +1,4 @@
-// Two results side by side: their differences, and whether chance explains them.
+// Two results side by side: their differences, and whether chance explains them (science.md, eq. 18).
 #pragma once
 
 #include <limits>

@@ -62,7 +62,7 @@ Step fitted(const Series& series, const std::vector<double>& x, double between) 
 }
 
 /// Variance between campaigns beyond their own (Paule, Mandel, J. Res. NBS 87 (1982) 377): what makes the sum of
-/// squares as large as its degrees of freedom.
+/// squares as large as its degrees of freedom; science.md, eq. 32.
 double between_of(const Series& series, const std::vector<double>& x, double freedom) {
   if (fitted(series, x, 0).left <= freedom) return 0;
   double low = 0, high = 1e-30;

@@ -1,5 +1,5 @@
 // Gain of the motor module's clock from the blade-pass line: the blades load the cell blades · ω/2π times a second, and
-// the box's clock times that line. Its frequency over the one of the reported speed is the gain.
+// the box's clock times that line (science.md, eq. 34). Its frequency over the one of the reported speed is the gain.
 #pragma once
 
 #include <optional>

@@ -13,6 +13,7 @@ namespace kphi::fit {
 struct Dynamics {
   std::size_t steps = 0;  ///< changes of speed behind the figures of the motor
   /// ω(t) = ω1 + (ω0 − ω1) e^{−(t − delay)/τ} fitted to the readings of all steps together: one step has too few.
+  /// science.md, eq. 33.
   Estimate motor_time_constant_s;
   Estimate motor_delay_s;  ///< from the command's time stamp
   Estimate thrust_lag_s;   ///< mean delay of the thrust behind ω² (results/reduction/lag.hpp); NaN: unknown

@@ -35,7 +35,7 @@ struct RejectedPoint {
 struct CurvePrediction {
   double phi_deg = 0;
   Budget k;               ///< of the curve, N/(rad/s)²
-  Budget scaling_factor;  ///< k_i as it flies, ScalingLaw::clamped; errors common to all k cancel
+  Budget scaling_factor;  ///< k_i as it flies (science.md, eq. 2); errors common to all k cancel
   /// Relative standard uncertainty of ω̂ = sqrt(T/k) for a given T: half that of k. 1.
   double speed_u_share = 0;
   bool clipped = false;       ///< the curve lies above K_T here, k_i is held at 1

@@ -45,7 +45,7 @@ struct Budget {
   double value = 0;
   std::vector<BudgetRow> rows;
 
-  /// Standard uncertainty (eq. 10; rows are independent) of the sources that are known; NaN if none is.
+  /// Standard uncertainty (science.md, eq. 18; rows are independent) of the sources that are known; NaN if none is.
   [[nodiscard]] double combined() const;
   [[nodiscard]] double freedom() const;                      ///< Welch-Satterthwaite (G.2b)
   [[nodiscard]] double coverage(double level = 0.95) const;  ///< Student's factor for freedom()

@@ -1,6 +1,6 @@
 // What the power of a propeller says of its numbers: no propeller makes more thrust of a power than the ideal disk of
-// its diameter, P = T^1.5/sqrt(2 ρ A) (Froude), and no shaft gives more power than its motor takes. What breaks such a
-// law is a unit, a pole count, a lever arm or a shunt, whatever else fits.
+// its diameter, P = T^1.5/sqrt(2 ρ A) (Froude; science.md, eq. 28), and no shaft gives more power than its motor takes.
+// What breaks such a law is a unit, a pole count, a lever arm or a shunt, whatever else fits.
 #pragma once
 
 #include <string>

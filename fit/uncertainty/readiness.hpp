@@ -1,4 +1,5 @@
-// Whether a drone may fly on a result: by how much its thrust may be wrong, and what speaks against its numbers.
+// Whether a drone may fly on a result: by how much its thrust may be wrong (science.md, eq. 27), and what speaks
+// against its numbers.
 #pragma once
 
 #include <cstdint>

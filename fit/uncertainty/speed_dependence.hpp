@@ -1,14 +1,14 @@
 // Tests T = k ω²: k at each speed, its trend with speed, and the lack of fit against the scatter of repetitions. On
 // real propellers k rises by up to a fifth over the speeds of a sweep, far above all noise.
 //
-// All steps of a run share its zero: an error z of it changes T/ω² by z/ω², which looks like a dependence on speed.
-// Therefore every run has its own zero in these tests, known to within the uncertainty in its steps (a
-// pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); without that uncertainty the zero is free and
-// absorbs a constant force. Other errors of neighbouring steps (slow noise, a wandering zero) show in the differences
-// between repetitions: the trend is judged by its scatter from run to run, pooled over all φ, and the lack of fit with
-// degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484). A single repetition shows none
-// of them: its trend is as uncertain as its own residuals say, and a zero that wanders between its two measurements as
-// zeros of this campaign do (a random walk tied at both ends) makes of it.
+// (science.md, eq. 23 and 24.) All steps of a run share its zero: an error z of it changes T/ω² by z/ω², which looks
+// like a dependence on speed. Therefore every run has its own zero in these tests, known to within the uncertainty in
+// its steps (a pseudo-observation: Theil, Goldberger, Int. Econ. Rev. 2 (1961) 65); without that uncertainty the zero
+// is free and absorbs a constant force. Other errors of neighbouring steps (slow noise, a wandering zero) show in the
+// differences between repetitions: the trend is judged by its scatter from run to run, pooled over all φ, and the lack
+// of fit with degrees of freedom reduced for correlated steps (Box, Ann. Math. Stat. 25 (1954) 484). A single
+// repetition shows none of them: its trend is as uncertain as its own residuals say, and a zero that wanders between
+// its two measurements as zeros of this campaign do (a random walk tied at both ends) makes of it.
 #pragma once
 
 #include <span>

@@ -13,8 +13,8 @@ struct SpeedTrend {
   double reference_rad_s = 0;  ///< where k is the k of the fit
 };
 
-/// Speed to which the k of the fit belongs, rad/s; the fastest one where the estimator gives no such k: with an offset,
-/// or weighted otherwise than equally.
+/// Speed to which the k of the fit belongs, rad/s (science.md, eq. 25); the fastest one where the estimator gives no
+/// such k: with an offset, or weighted otherwise than equally.
 [[nodiscard]] double reference_speed(const Identification& identification);
 
 /// Of k with the speed, share per rad/s: one for all φ, the weighted mean of theirs, its u with their scatter (Birge).

@@ -1,7 +1,7 @@
 // By how much the thrust may be wrong in flight: one number, at 95 %, for the φ and speeds that the coefficients claim.
 //
 // Who asks for a thrust gets k measured / k flown of it. What was measured is k at each occlusion, joined by chords,
-// and nothing more. As shares of the thrust that was asked for (docs/science.md, "The thrust that flies"):
+// and nothing more. As shares of the thrust that was asked for (science.md, eq. 26 and 27):
 //   off = |k flown − k measured| + |what the speed does to k| + |what a test found|,
 // and u from the budget of k and of the speed's influence; the number holds a normal error of that mean and deviation
 // 95 times of 100. What a test looks for enters with the size that was seen,

@@ -1,5 +1,5 @@
-// Drag torque of the rotor, Q = k_Q(φ) ω², with its budget: the yaw authority that an occluded rotor keeps is measured,
-// not assumed.
+// Drag torque of the rotor, Q = k_Q(φ) ω² (science.md, eq. 1), with its budget (eq. 18 in newton metres): the yaw
+// authority that an occluded rotor keeps is measured, not assumed.
 #pragma once
 
 #include <vector>

@@ -3,8 +3,8 @@
 //
 // Mean of correlated values: the Γ-method (U. Wolff, Monte Carlo errors with less errors, Comput. Phys. Commun. 156
 // (2004) 143, equations 31, 49 and 52, S = 1.5). Values that alternate, as a periodic noise makes them, would end its
-// sum too early and far too low; for these, the slow cosines (E. Lazarus et al., HAR inference: recommendations for
-// practice, J. Bus. Econ. Stat. 36 (2018) 541: equal-weighted cosines, Student's t).
+// sum too early and far too low; for these, the slow cosines (science.md, eq. 4 to 6) (E. Lazarus et al., HAR
+// inference: recommendations for practice, J. Bus. Econ. Stat. 36 (2018) 541: equal-weighted cosines, Student's t).
 #pragma once
 
 #include <cstddef>

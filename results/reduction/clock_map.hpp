@@ -1,6 +1,7 @@
 // Bench time of the Net Box samples, for the whole program. The only clock of the box is ft_sequence, which counts at
 // its own rate; arrival stamps are bench time plus a delay of which only the smallest is steady. Therefore: the
-// smallest (arrival - device time) per 0.5 s of device time, and a least-squares line through these over the whole run.
+// smallest (arrival - device time) per 0.5 s of device time, and a least-squares line through these over the whole run
+// (science.md, eq. 3).
 #pragma once
 
 #include <cmath>

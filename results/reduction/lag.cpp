@@ -255,6 +255,7 @@ double best_of_grid(std::span<const Prepared> transitions) {
 /// Standard uncertainty of the delay because the speed may change at any time between two readings, s. It averages out
 /// over steps whose readings fall at any distance from the command; the part that does not is the resultant of these
 /// distances, as angles on a circle of one reading interval (1: all readings keep the same distance, no averaging).
+/// science.md, eq. 11.
 double u_between_readings(std::span<const Prepared> transitions) {
   std::complex<double> resultant = 0;
   double variance = 0, weights = 0;

@@ -1,9 +1,10 @@
 // Lag of the thrust behind the speed: box, filter, network, air and stand together.
 //
-// Model: thrust(t) = a + b·(h ∗ ω²)(t), where h delays by L and smooths with the time constant τ. Each step has its own
-// a and b, the run has one L and one τ; least squares over all steps. The reported lag is the mean delay L + τ: a
-// thrust that follows a ramp of ω² is late by exactly that. Between two readings ω² is taken as linear: over steps
-// whose readings fall at any distance from the command that has no bias, whatever the response of the motor.
+// Model (science.md, eq. 10): thrust(t) = a + b·(h ∗ ω²)(t), where h delays by L and smooths with the time constant τ.
+// Each step has its own a and b, the run has one L and one τ; least squares over all steps. The reported lag is the
+// mean delay L + τ: a thrust that follows a ramp of ω² is late by exactly that. Between two readings ω² is taken as
+// linear: over steps whose readings fall at any distance from the command that has no bias, whatever the response of
+// the motor.
 #pragma once
 
 #include <limits>

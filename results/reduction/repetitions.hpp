@@ -1,4 +1,4 @@
-// Repetitions of an occlusion, judged.
+// Repetitions of an occlusion, judged; by science.md, eq. 14, without the run that is judged.
 #pragma once
 
 #include <span>

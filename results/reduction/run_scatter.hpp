@@ -30,7 +30,7 @@ enum class Keep {
 };
 
 /// Both by restricted maximum likelihood from k and offset of the runs about the means of their occlusion, pooled over
-/// occlusions. docs/science.md has the equations. 0 without repetitions.
+/// occlusions (science.md, eq. 14 to 16). 0 without repetitions.
 [[nodiscard]] RunScatter scatter_between(std::span<const std::vector<RunShare>> occlusions, Keep keep = Keep::averaged);
 /// How well runs that explain so much of their variance would tell a scatter of this size.
 [[nodiscard]] RunScatter scatter_expected(double share, double zero_n,

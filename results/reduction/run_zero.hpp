@@ -1,4 +1,5 @@
-// The zero that all steps of a run share: how far it moves, and what it does to the k of the run.
+// The zero that all steps of a run share: how far it moves, and what it does to the k of the run (science.md, eq. 8 and
+// 9).
 #pragma once
 
 #include <limits>

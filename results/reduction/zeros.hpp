@@ -56,7 +56,7 @@ struct Zero {
 struct ZeroThen {
   double force = 0;
   double torque = 0;
-  double u = 0;        ///< of the force, standard; excludes deviations from a linear drift
+  double u = 0;        ///< of the force, standard (science.md, eq. 7); excludes deviations from a linear drift
   double freedom = 0;  ///< degrees of freedom of u
 };
 
