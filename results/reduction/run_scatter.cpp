@@ -80,13 +80,15 @@ struct Fit {
 
 /// By Fisher's scoring: least squares of the variances, each weighed by what the last round makes of it, none below 0.
 Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) {
-  constexpr int kRounds = 40;
+  constexpr int kMostRounds = 400;
+  constexpr double kConverged = 1e-13;
   Fit fit;
   for (const Sample& one : samples) {
     if (with_share && one.of_share > 0) fit.share = std::max(fit.share, one.squares / one.freedom);
     if (with_zero && one.of_zero > 0) fit.zero = std::max(fit.zero, one.squares / one.freedom / one.of_zero);
   }
-  for (int round = 0; round < kRounds; ++round) {
+  bool moves = true;
+  for (int round = 0; moves && round < kMostRounds; ++round) {
     fit.inform(samples);
     double share = 0, zero = 0;
     for (const Sample& one : samples) {
@@ -104,8 +106,12 @@ Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) 
       if (next_share < 0) next_share = 0, next_zero = zero / fit.of_zero;
       next_zero = std::max(0.0, next_zero);
     }
-    fit.share = 0.5 * (fit.share + next_share);
-    fit.zero = 0.5 * (fit.zero + next_zero);
+    const auto halfway = [](double& now, double next) {
+      const bool moved = std::abs(next - now) > kConverged * now;
+      now = 0.5 * (now + next);
+      return moved;
+    };
+    moves = halfway(fit.share, next_share) | halfway(fit.zero, next_zero);
   }
   return fit;
 }
