@@ -1,8 +1,10 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -113,12 +115,6 @@ std::string lines_of_shape(const std::string& name, const Vehicle& vehicle) {
                      by_hubs ? " m" : "°", occlusions);
 }
 
-std::string picture_of(const Vehicle& vehicle) {
-  std::string picture = "\nfrom above, the nose up; '#' of a disk is covered by the body ':'\n";
-  for (const std::string& line : profiles::shapes_in_characters(vehicle)) picture += line + "\n";
-  return picture;
-}
-
 std::string lines_of(const flight::Build& build, const flight::Gains& gains) {
   return fmt::format(
       "  dynamics   {:g} kg, of which {:g} kg at each hub; {:.3g} N per rotor carry it\n"
@@ -155,12 +151,12 @@ std::string lines_of(const Vehicle& vehicle) {
       "  body       {}, {}, propeller radius {:g} m\n"
       "  rotors     {}{}\n"
       "  speeds     {:.6g} to {:.6g} RPM\n"
-      "  overlap    {}\n{}{}{}",
+      "  overlap    {}\n{}{}\n{}\n",
       in_words(vehicle),
       vehicle.hubs.empty() ? fmt::format("arms {:g} m", vehicle.arm_length.value()) : "hubs given for each shape",
       vehicle.propeller_radius.value(), rotors_of(vehicle), spins_of(vehicle), to_rpm(vehicle.speed_min),
       to_rpm(vehicle.speed_max), compensation::name_of(vehicle.overlap), shapes, what_flies(vehicle),
-      picture_of(vehicle));
+      fmt::join(profiles::shapes_in_characters(vehicle), "\n"));
 }
 
 std::string lines_of(const profiles::World& world) {
@@ -346,6 +342,8 @@ CheckedFile check_alone(const std::string& path) {
   CheckedFile file;
   file.path = path;
   attempt(file, [&] {
+    if (std::filesystem::is_directory(path))
+      throw ConfigurationError(path + ": is a folder; `kphi verify` checks a campaign folder");
     const std::string text = read_text(path);
     const Kind& kind = kind_of(text, path);
     file.kind = kind.word;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -54,9 +55,18 @@ CLI::Option* add_value(CLI::App& command, const char* name, const char* word, Va
   return command.add_option(name, into, what)->type_name(word);
 }
 
+/// Options that follow stand under this heading of --help; those before it are for every day.
+inline void begin_group(CLI::App& command, const char* heading) { command.option_defaults()->group(heading); }
+
 /// CLI11's checks of a path, without their words in --help.
 inline const CLI::Validator kExistingFile = CLI::ExistingFile.description("");
-inline const CLI::Validator kExistingFolder = CLI::ExistingDirectory.description("");
+inline const CLI::Validator kExistingFolder(
+    [](std::string& path) {
+      std::error_code none;
+      const bool is_file = std::filesystem::exists(path, none) && !std::filesystem::is_directory(path, none);
+      return is_file ? path + " is a file; name the campaign folder that it is in" : CLI::ExistingDirectory(path);
+    },
+    "");
 inline const CLI::Validator kExistingPath = CLI::ExistingPath.description("");
 
 inline void print_json(const Json& json, int indent = 2) {

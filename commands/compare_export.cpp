@@ -287,7 +287,7 @@ void add_compare(CLI::App& program, ExitCode& exit_code) {
   command
       .add_option("--truth", request.truth,
                   "compare one RESULT with this file of kphi sim --truth; exit with 5 if it is far off")
-      ->check(CLI::ExistingFile);
+      ->check(kExistingFile);
   command.add_flag("--claims", request.claims, "check the paper's statements on these propellers");
   add_value(command, "--predict", "DIAMETERxBLADES", request.predict,
             "predict k of a propeller that nobody measured, from three others; may be repeated")
@@ -315,8 +315,9 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   add_value(command, "--vehicle", "FILE", request.vehicle,
             "vehicle file, for targets that compute k from arm angles (c, px4, ros2, ardupilot)")
-      ->check(CLI::ExistingFile);
+      ->check(kExistingFile);
   command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
+  begin_group(command, "What the file does not tell");
   command.add_option("--phi-deg", request.options.phi_deg,
                      "occlusion for targets with one constant per motor (default 0)");
   command

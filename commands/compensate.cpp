@@ -1,5 +1,6 @@
 #include "commands/compensate.hpp"
 
+#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,6 +16,7 @@
 #include "base/text.hpp"
 #include "commands/commands.hpp"
 #include "commands/inputs.hpp"
+#include "profiles/vehicle_drawing.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -217,6 +219,8 @@ ExitCode compensate(const CompensateRequest& request) {
   std::cin.tie(nullptr);
   const profiles::Vehicle vehicle = profiles::load_vehicle(request.vehicle);
   Compensator compensator = compensator_of(request, vehicle);
+  if (isatty(STDERR_FILENO) != 0)
+    std::cerr << fmt::format("{}\n", fmt::join(profiles::shapes_in_characters(vehicle), "\n"));
   if (isatty(STDIN_FILENO) != 0) std::cerr << "reading CSV from the keyboard; Ctrl-D ends the input\n";
   const RowCounts counts = compensate_rows(std::cin, std::cout, std::cerr, compensator,
                                            request.json ? RowFormat::json_lines : RowFormat::csv,

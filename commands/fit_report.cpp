@@ -40,8 +40,26 @@ using namespace fit;
 
 namespace fs = std::filesystem;
 
+/// What a report shows beside the fit, on request.
+struct PageRequest {
+  bool claims = false;
+  std::string earlier;
+};
+
+/// The campaign that is to be drawn as a ghost. Throws ConfigurationError if it is of another propeller.
+std::optional<FittedFolder> earlier_of(const PageRequest& page, const Fitted& fitted) {
+  if (page.earlier.empty()) return std::nullopt;
+  FittedFolder earlier = fitted_again(page.earlier);
+  const std::string &ours = fitted.identification.propeller, &theirs = earlier.fitted.identification.propeller;
+  if (ours != theirs)
+    throw ConfigurationError(fmt::format("--earlier {}: of propeller {}, not of {}; name a campaign of the same",
+                                         page.earlier, theirs, ours));
+  return earlier;
+}
+
 /// Fills the runs of `input` from their files and draws.
-Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures) {
+Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures, const PageRequest& page = {}) {
+  const auto earlier = earlier_of(page, fitted);
   const Identification& identification = fitted.identification;
   RawSamples raw;
   if (input.campaign) {
@@ -49,7 +67,16 @@ Figures draw_all(const Fitted& fitted, FitInput& input, const fs::path& figures)
     input.provenance.runs = std::move(raw.runs);
   }
   if (raw.shares.empty()) raw.shares = shares_of_steps(identification);
-  Figures drawn = draw_figures(fitted, raw.shares, figures, "gnuplot", raw.settling ? &*raw.settling : nullptr);
+  DrawnBeside beside{raw.settling ? &*raw.settling : nullptr, raw.whole ? &*raw.whole : nullptr};
+  beside.paper = page.claims;
+  if (earlier) {
+    const Provenance& from = earlier->input.provenance;
+    beside.earlier = &earlier->fitted;
+    beside.earlier_words =
+        fmt::format("{} ({}, {})", (fs::path(page.earlier) / ".").lexically_normal().parent_path().filename().string(),
+                    name_of(from.origin), from.measured_utc.substr(0, 10));
+  }
+  Figures drawn = draw_figures(fitted, raw.shares, figures, "gnuplot", beside);
   if (!drawn.skipped.empty()) fmt::print(stderr, "kphi: figures skipped: {}\n", drawn.skipped);
   return drawn;
 }
@@ -82,9 +109,10 @@ struct OnVehicle {
 
 /// `apart`: how the names of page and figures begin, apart from those of the campaign in the same folder.
 void write_report(const Fitted& fitted, FitInput& input, const fs::path& page, const std::string& apart = {},
-                  const OnVehicle& there = {}) {
-  const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"));
-  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input), there.verdict, there.drawing}));
+                  const OnVehicle& there = {}, const PageRequest& asked = {}) {
+  const Figures figures = draw_all(fitted, input, page.parent_path() / (apart + "figures"), asked);
+  write_page(page, format_report(fitted, {input.provenance, figures, drawing_of(input), there.verdict, there.drawing,
+                                          asked.claims}));
 }
 
 struct FitRequest {
@@ -102,6 +130,7 @@ struct FitRequest {
   bool accept = false;
   bool json = false;
   std::string vehicle;
+  PageRequest page;
 };
 
 /// "A:B" in RPM; either end may be left out.
@@ -324,7 +353,7 @@ ExitCode run_fit(const FitRequest& request) {
   fmt::print(stderr, "{}coefficients  {}\n", caution_text(identification, fitted.analysis), file.string());
   std::vector<fs::path> written{file};
   if (!request.no_report) {
-    write_report(fitted, input, folder / (apart + "report.html"), apart, there);
+    write_report(fitted, input, folder / (apart + "report.html"), apart, there, request.page);
     written.push_back(folder / (apart + "report.html"));
   }
   record(input, folder, written);
@@ -352,10 +381,18 @@ void add_choice(CLI::App& command, const std::string& option, Enum& into, const 
 struct ReportRequest {
   std::vector<std::string> folders;
   std::string out;
+  PageRequest page;
 };
+
+void add_page_options(CLI::App& command, PageRequest& page) {
+  command.add_flag("--claims", page.claims, "beside ours what the paper says of this propeller");
+  add_value(command, "--earlier", "DIR", page.earlier, "draw k of an earlier campaign of this propeller behind ours")
+      ->check(kExistingFolder);
+}
 
 /// One page of several campaigns; their figures go beside it, a folder each.
 ExitCode report_several(const ReportRequest& request) {
+  if (!request.page.earlier.empty()) throw ConfigurationError("--earlier is for the report of one campaign");
   const fs::path page = request.out.empty() ? fs::path("report.html") : fs::path(request.out);
   const fs::path figures = page.parent_path() / "figures";
   std::vector<Fitted> family;
@@ -389,7 +426,7 @@ ExitCode run_report(const ReportRequest& request) {
   const std::string& path = request.folders.front();
   auto [input, fitted] = fitted_again(path);
   const fs::path page = request.out.empty() ? fs::path(path) / "report.html" : fs::path(request.out);
-  write_report(fitted, input, page);
+  write_report(fitted, input, page, {}, {}, request.page);
   if (request.out.empty()) record(input, path, {page});
   return ExitCode::ok;
 }
@@ -403,8 +440,22 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_argument(command, "INPUT", request.path,
                "campaign folder, steps.csv, or K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…]")
       ->check(kExistingPath);
-  add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
-      ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
+  add_value(command, "--out", "FILE", request.out, "coefficient file; report and figures go beside it");
+  add_value(
+      command, "--vehicle", "FILE", request.vehicle,
+      "vehicle file: also say by how much the thrust may be wrong for its φ and speeds, and draw it in the report")
+      ->check(kExistingFile);
+  command.add_option("--fly-within", request.fly_within_percent,
+                     "error of the thrust, percent, up to which the result is fit to fly (default 3; with care to 10)");
+  add_value(command, "--leave-out", "PHI:REPETITION:CAUSE", request.left_out,
+            "leave out a run for a known cause, which the report names; may be repeated")
+      ->allow_extra_args(false);
+  command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
+  command.add_flag("--json", request.json, "print the result as JSON");
+  begin_group(command, "The report");
+  command.add_flag("--no-report", request.no_report, "write coefficients only");
+  add_page_options(command, request.page);
+  begin_group(command, "The curve k(φ)");
   add_choice(command, "--form", request.options.curve.form,
              "form of k(φ): a line, or a table from K_T through every occlusion", {CurveForm::line, CurveForm::table});
   command.add_flag("--anchored", request.options.curve.anchored,
@@ -412,6 +463,11 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--points", "DEG,DEG,…", request.options.curve.points_deg,
             "angles that carry the curve, in degrees (default: all above 0)")
       ->delimiter(',');
+  using compensation::OverlapMeasure;
+  add_choice(command, "--overlap", request.options.overlap,
+             "how φ is measured in flight, to be the same in the vehicle file",
+             {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
+  begin_group(command, "Estimators");
   add_value(command, "--speed-range-rpm", "A:B", request.speed_range_rpm,
             "speeds to fit (default 3000: and up; below, noise of the load cell hides the thrust)");
   command.add_option("--at-speed-rpm", request.at_speed_rpm,
@@ -425,36 +481,23 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_choice(command, "--curve-loss", request.options.curve.loss,
              "robust loss of the line, scaled by the error of each k",
              {Loss::none, Loss::huber, Loss::cauchy, Loss::tukey});
-  using compensation::OverlapMeasure;
-  add_choice(command, "--overlap", request.options.overlap,
-             "how φ is measured in flight, to be the same in the vehicle file",
-             {OverlapMeasure::rim_arc, OverlapMeasure::area_share, OverlapMeasure::load_share});
+  begin_group(command, "What the input does not tell");
+  add_value(command, "--k-unit", "UNIT", request.k_unit, "unit of a column named k: N/(rad/s)^2 or N/RPM^2")
+      ->check(CLI::IsMember({"N/(rad/s)^2", "N/RPM^2"}));
   add_value(
       command, "--u", "NAME=VALUE", request.uncertainties,
       "standard uncertainty of calibration, cross-axis, clock, density, mounting (all relative) or alignment-deg; may "
       "be repeated")
       ->allow_extra_args(false);
-  add_value(command, "--leave-out", "PHI:REPETITION:CAUSE", request.left_out,
-            "leave out a run for a known cause, which the report names; may be repeated")
-      ->allow_extra_args(false);
+  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: from the steps)");
+  command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
+  command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
+  begin_group(command, "Developers");
   add_value(command, "--family", "PATH", request.family,
             "fit other propellers the same way and check the paper's claims")
       ->check(kExistingPath);
   command.add_flag("--raw", request.raw,
                    "add time constants, and a check of the motor's clock by blade pass, from the first run");
-  add_value(command, "--out", "FILE", request.out, "coefficient file; report and figures go beside it");
-  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: from the steps)");
-  command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
-  command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
-  command.add_flag("--no-report", request.no_report, "write coefficients only");
-  command.add_option("--fly-within", request.fly_within_percent,
-                     "error of the thrust, percent, up to which the result is fit to fly (default 3; with care to 10)");
-  add_value(
-      command, "--vehicle", "FILE", request.vehicle,
-      "vehicle file: also say by how much the thrust may be wrong for its φ and speeds, and draw it in the report")
-      ->check(CLI::ExistingFile);
-  command.add_flag("--accept", request.accept, "exit with 0 also if the verdict is: do not fly yet");
-  command.add_flag("--json", request.json, "print the result as JSON");
 }
 
 void add_report(CLI::App& program, ExitCode& exit_code) {
@@ -467,6 +510,7 @@ void add_report(CLI::App& program, ExitCode& exit_code) {
       ->check(kExistingFolder);
   add_value(command, "--out", "FILE", request.out,
             "page (default: report.html in DIR; for several DIRs: in the working folder)");
+  add_page_options(command, request.page);
 }
 
 }  // namespace kphi::commands

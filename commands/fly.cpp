@@ -366,20 +366,21 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
       "default: K_T of the file if it is within 30 % of what is published for such a propeller, else that; no error)");
   add_value(command, "--open", "SHAPE", request.open, "shape of the vehicle file to fly for X (default: X)");
   add_value(command, "--folded", "SHAPE", request.folded, "shape to fly for O, such as H or T (default: O)");
+  command.add_option("--draws", request.draws, "sets of circumstances to draw, such as 400 (default 0)")
+      ->check(CLI::Range(0, 10000));
+  add_value(command, "--out", "DIR", request.out, "folder for traces and draws (CSV) and figures (SVG)");
+  command.add_flag("--json", request.json, "print the result as JSON");
+  begin_group(command, "Developers");
   std::vector<std::string> names;
   for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
   add_value(command, "--experiment", "NAME", request.experiment,
             fmt::format("one of the nine (default: all): {}", fmt::join(names, ", ")))
       ->check(CLI::IsMember(names).description(""));
-  command.add_option("--draws", request.draws, "sets of circumstances to draw, such as 400 (default 0)")
-      ->check(CLI::Range(0, 10000));
   command.add_option("--seed", request.seed, "seed of noise and draws")->capture_default_str();
   command
       .add_option("--threads", request.threads,
                   "number of threads (default 0: one per core); the result does not depend on it")
       ->check(CLI::Range(0, 256));
-  add_value(command, "--out", "DIR", request.out, "folder for traces and draws (CSV) and figures (SVG)");
-  command.add_flag("--json", request.json, "print the result as JSON");
 }
 
 }  // namespace kphi::commands

@@ -218,40 +218,43 @@ void add_import(CLI::App& program, ExitCode& exit_code) {
   add_argument(command, "FILE", request.files, "tables; units come from their headers")->check(kExistingFile);
   add_value(command, "--out", "DIR", request.out, "output folder; every table becomes <name>/steps.csv in it")
       ->required();
+  command.add_flag("--tared", rows.tared, "the stand was tared: take the zero of the thrust as it is");
+  add_value(command, "--tare-rows", "N", rows.tare_rows, "tare on the first N rows, with the motor off (default 0)");
+  command.add_flag("--reverse-thrust", rows.reverse_thrust, "reverse the sign of the thrust");
+  command.add_flag("--same-propeller", request.same_propeller,
+                   "all FILEs are of one propeller: name those whose k differs from the others");
+  command.add_flag("--json", request.json, "print one JSON record per table");
+  begin_group(command, "How the tables are written");
   add_value(command, "--column", "ROLE=HEADER[:UNIT]", request.columns,
             "meaning of one column whose name does not tell it, repeat for each; roles: " + role_list());
+  add_value(
+      command, "--layout", "FILE", request.layout,
+      "how the tables are written: read from FILE if it exists, else found in the first table and written to FILE");
   command
       .add_option("--separator", request.separator,
                   "what is between two fields (default: what makes a table of the lines)")
       ->check(CLI::IsMember({"comma", "semicolon", "tab", "bar", "blanks"}));
   command.add_option("--decimal", request.decimal, "mark before decimals; the other one is between thousands")
       ->check(CLI::IsMember({"point", "comma"}));
-  add_value(
-      command, "--layout", "FILE", request.layout,
-      "how the tables are written: read from FILE if it exists, else found in the first table and written to FILE");
+  begin_group(command, "What the tables do not tell");
+  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: the file's name)");
+  command
+      .add_option("--diameter-in", request.options.diameter_in,
+                  "diameter in inches (UIUC default: from the file's name)")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--blades", request.options.blades, "number of blades");
+  command
+      .add_option(
+          "--air-density-kg-m3", request.options.air_density_kg_m3,
+          "air density of the log, taken as exact; of a UIUC table, for which thrust is computed (default 1.225)")
+      ->check(CLI::PositiveNumber);
+  begin_group(command, "Which rows and speeds");
   command.add_option("--speed", request.speed, "which speed to take (default: electrical where it turns)")
       ->check(CLI::IsMember({"electrical", "optical"}));
   add_value(command, "--speed-factor", "NUMBER", request.speed_factor,
             "multiply the speed by a number or P/Q = assumed / true pole count, such as 7/6");
   command.add_option("--speed-above-rpm", rows.speed_above_rpm, "leave out rows at or below this speed (default 0)");
   command.add_option("--throttle-above-us", rows.throttle_above_us, "leave out rows at or below this throttle");
-  add_value(command, "--tare-rows", "N", rows.tare_rows, "tare on the first N rows, with the motor off (default 0)");
-  command.add_flag("--tared", rows.tared, "the stand was tared: take the zero of the thrust as it is");
-  command.add_flag("--reverse-thrust", rows.reverse_thrust, "reverse the sign of the thrust");
-  command
-      .add_option("--diameter-in", request.options.diameter_in,
-                  "diameter in inches (UIUC default: from the file's name)")
-      ->check(CLI::PositiveNumber);
-  command
-      .add_option(
-          "--air-density-kg-m3", request.options.air_density_kg_m3,
-          "air density of the log, taken as exact; of a UIUC table, for which thrust is computed (default 1.225)")
-      ->check(CLI::PositiveNumber);
-  add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: the file's name)");
-  command.add_option("--blades", request.options.blades, "number of blades");
-  command.add_flag("--same-propeller", request.same_propeller,
-                   "all FILEs are of one propeller: name those whose k differs from the others");
-  command.add_flag("--json", request.json, "print one JSON record per table");
 }
 
 }  // namespace kphi::commands

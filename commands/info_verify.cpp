@@ -60,6 +60,7 @@ Json describe(const std::filesystem::path& path) {
             {"clock_gain", header.clock_gain_u > 0 ? Json{header.clock_gain, header.clock_gain_u} : Json()}};
   KPHI_JSON_MEMBERS(told, run.account, lost_network, lost_host, duplicates, late, reordered, stalled, malformed,
                     restarts, reboots);
+  KPHI_JSON_MEMBERS(told, header.load_cell, counts_per_newton, counts_per_newton_metre);
   KPHI_JSON_MEMBERS(told, header, occlusion_deg, repetition, started_utc, supply_voltage_v, coil_temperature_max_degc,
                     tool_version, uuid);
   for (std::size_t i = 0; i < kMotorCounts.size(); ++i) told[kMotorCounts[i]] = run.motor_counts[i];
@@ -109,6 +110,7 @@ void print_folder(const std::string& path, const Json& folder) {
 }
 
 ExitCode info(const VerifyRequest& asked) {
+  refuse_other_input(asked.path, InputKind::run);
   const bool folder = std::filesystem::is_directory(asked.path);
   Json found;
   try {
@@ -134,6 +136,7 @@ std::vector<std::string> problems_of_coefficients(const CampaignFolder& folder) 
 }
 
 ExitCode verify(const VerifyRequest& asked) {
+  refuse_other_input(asked.path, InputKind::run);
   Json found{{"path", asked.path}};
   std::vector<std::string> problems, remarks;
   std::string words;

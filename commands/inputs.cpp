@@ -244,14 +244,19 @@ void refuse_other_input(const std::string& path, InputKind wanted) {
   const std::string begin = beginning_of(path);
   const auto refuse = [&](const std::string& mark, const std::string& word, const char* next) {
     if (begin.find("\n" + mark) == std::string::npos) return;
-    throw ConfigurationError(fmt::format("{}: this is a {} file; {}", path, word, next));
+    throw ConfigurationError(fmt::format("{}: this is {}; {}", path, profiles::file_of_kind(word), next));
   };
   for (const profiles::FileKindInfo& kind : profiles::kFileKinds)
     refuse(fmt::format("format: {}", kind.format), kind.word, next_move_for(kind.kind));
-  if (wanted != InputKind::run)
-    refuse("\x89HDF", "run", "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in");
   if (wanted != InputKind::coefficients)
     refuse("format: kphi-coefficients/", "coefficient", "`kphi export`, `kphi compare` and `kphi compensate` take it");
+  refuse("format: kphi-faults/", "faults", "`kphi sim --faults` takes it");
+  refuse("format: kphi-sim-motor/", "simulated motor", "name it in a bench file: simulation.motor");
+  const bool may_be_damaged = fs::path(path).extension() == ".h5";
+  if (wanted == InputKind::run && !may_be_damaged && !begin.starts_with("\n\x89HDF"))
+    throw ConfigurationError(path + ": not a run file (HDF5); name a campaign folder or a file of its runs/");
+  if (wanted != InputKind::run)
+    refuse("\x89HDF", "run", "`kphi info` shows it, `kphi fit` takes the campaign folder that it is in");
 }
 
 FitInput load_input(const std::string& path, const std::string& unit_of_k) {
@@ -391,7 +396,8 @@ compensation::Rotors<compensation::ThrustCurve> load_curves_for(const std::vecto
   std::map<std::string, compensation::ThrustCurve> curves;
   for (const std::string& path : coefficients) {
     if (curves.contains(path)) continue;
-    const compensation::Coefficients file = load_standing_coefficients(path);
+    const compensation::Coefficients file =
+        load_standing_coefficients(fs::is_directory(path) ? coefficient_file_of(path).string() : path);
     const auto mismatch = compensation::overlap_mismatch(file.curve.overlap(), path, vehicle.overlap, vehicle.path);
     if (mismatch) throw ConfigurationError(*mismatch);
     print_standing(file, &vehicle);

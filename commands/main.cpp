@@ -98,6 +98,7 @@ int end(ExitCode exit_code) {
 ExitCode run(int argc, char** argv) {
   CLI::App program("kphi: propeller test stand to k(φ) to flight", "kphi");
   program.formatter(kphi::commands::narrow_help());
+  program.set_help_flag("-h,--help", "print this help and exit");
   program.set_version_flag("--version", std::string("kphi ") + kphi::kVersion);
   program.require_subcommand(1);
   ExitCode exit_code = ExitCode::ok;

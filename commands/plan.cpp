@@ -89,6 +89,12 @@ void add_plan(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--want", "\"WHAT PERCENT %\"", request.wishes,
             "half of the 95 % interval of K_T, slope, k(DEG) or k_i(DEG); may be repeated")
       ->allow_extra_args(false);
+  add_value(command, "--out", "FILE", request.out,
+            "write the chosen campaign to a new file: this one with its values replaced");
+  add_value(command, "--choose", "N", request.choose, "which of the choices (default: 1, the cheapest)")
+      ->check(CLI::PositiveNumber.description(""));
+  command.add_flag("--json", request.json, "print everything as JSON");
+  begin_group(command, "What is known of the stand");
   add_value(command, "--stand", "NAME=VALUE", request.stated,
             "what is known of the stand, instead of the pilot's: noise-n, memory-s, zero-n, runs, mounting, …")
       ->allow_extra_args(false);
@@ -100,11 +106,6 @@ void add_plan(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--minutes-per-mounting", "MIN", request.minutes_per_mounting,
             "of a person at the stand (default: 2)")
       ->check(CLI::NonNegativeNumber.description(""));
-  add_value(command, "--out", "FILE", request.out,
-            "write the chosen campaign to a new file: this one with its values replaced");
-  add_value(command, "--choose", "N", request.choose, "which of the choices (default: 1, the cheapest)")
-      ->check(CLI::PositiveNumber.description(""));
-  command.add_flag("--json", request.json, "print everything as JSON");
 }
 
 }  // namespace kphi::commands

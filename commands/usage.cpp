@@ -82,6 +82,12 @@ class NarrowHelp : public CLI::Formatter {
   std::string make_option(const CLI::Option* option, bool is_positional) const override {
     return row("  " + make_option_name(option, is_positional) + make_option_opts(option), make_option_desc(option));
   }
+  /// One blank line before a further group, not CLI11's two.
+  std::string make_group(std::string group, bool is_positional,
+                         std::vector<const CLI::Option*> options) const override {
+    const bool is_first = is_positional || group == get_label("Options");
+    return CLI::Formatter::make_group(std::move(group), is_positional, std::move(options)).substr(is_first ? 0 : 1);
+  }
   std::string make_subcommand(const CLI::App* verb) const override {
     return row(verb->get_display_name(true), verb->get_description());
   }

@@ -22,9 +22,10 @@ void refuse_other_kind(const SourceDocument& document, FileKind kind) {
   if (format == document.value.end() || !format->is_string()) return;
   const std::string word = word_of(format->get<std::string>());
   if (word.empty() || nearest_name(word, {info(kind).word})) return;
-  throw RefusedFile(document.path, {{document.value_mark("/format"), "/format",
-                                     fmt::format("this is a {} file, expected a {} file", word, info(kind).word),
-                                     fmt::format("name a file that begins with format: {}", info(kind).format)}});
+  throw RefusedFile(document.path,
+                    {{document.value_mark("/format"), "/format",
+                      fmt::format("this is {}, expected {}", file_of_kind(word), file_of_kind(info(kind).word)),
+                      fmt::format("name a file that begins with format: {}", info(kind).format)}});
 }
 
 }  // namespace

@@ -27,6 +27,11 @@ inline constexpr std::array<FileKindInfo, 6> kFileKinds{{
     {FileKind::layout, "layout", "kphi-layout/1"},
 }};
 
+/// "a bench file", "an answers file"
+[[nodiscard]] inline std::string file_of_kind(const std::string& word) {
+  return (word.front() == 'a' ? "an " : "a ") + word + " file";
+}
+
 [[nodiscard]] constexpr const FileKindInfo& info(FileKind kind) { return kFileKinds[static_cast<std::size_t>(kind)]; }
 
 /// The schema, verbatim from profiles/schema/, embedded in the program.

@@ -10,6 +10,7 @@
 #include <boost/algorithm/string/case_conv.hpp>
 #include <boost/locale/utf.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <regex>
 #include <sstream>
@@ -20,6 +21,9 @@
 
 namespace kphi::profiles {
 namespace {
+
+constexpr const char* kRunFile = "this is a run file (HDF5), not YAML";
+constexpr const char* kRunFileNext = "`kphi info` shows it, `kphi verify` checks it";
 
 /// Turns bytes of a text into places.
 class Lines {
@@ -334,6 +338,10 @@ SourceDocument parse_strict_yaml(const std::string& whole_text, const std::strin
   const bool has_byte_order_mark = whole_text.starts_with("\xEF\xBB\xBF");
   const std::string text = whole_text.substr(has_byte_order_mark ? 3 : 0);
   if (text.size() > kMaxTextBytes) refuse(path, {}, "larger than 1 MiB", "check that this is the right file");
+  if (text.starts_with("\x89HDF")) refuse(path, {}, kRunFile, kRunFileNext);
+  if (const auto first = text.substr(0, text.find('\n')); first.find_first_of(",;\t") < first.find_first_of(":#{["))
+    refuse(path, {}, "this is a table, not YAML",
+           "`kphi fit` takes steps and tables of k, `kphi import` logs of a stand");
   const Lines lines(text);
   if (const auto bad = first_bad_character(text))
     refuse(path, lines.mark(bad->offset), bad->what, "save the file as UTF-8 text");
@@ -359,6 +367,9 @@ std::string read_text(const std::string& path) {
   try {
     return read_text_file(path, kMaxTextBytes);
   } catch (const std::runtime_error& error) {
+    // Most are larger than any YAML may be.
+    if (std::error_code none; path.ends_with(".h5") && std::filesystem::is_regular_file(path, none))
+      refuse(path, {}, kRunFile, kRunFileNext);
     throw ConfigurationError(fmt::format("{}: {}", path, error.what()));
   }
 }

@@ -74,14 +74,14 @@ Frame frame_of(const Vehicle& vehicle) {
   return frame;
 }
 
-constexpr int kSide = 230, kNose = 16, kCaption = 34;
+constexpr int kSide = 230, kNose = 16, kCaption = 34, kRow = kNose + kSide + kCaption;
 
 /// One shape in a square of kSide, the caption below it; units of the picture, x to the right, y down.
 class ShapePicture {
  public:
   /// `id` keeps its clip paths apart from those of other shapes.
   ShapePicture(const Vehicle& vehicle, const Frame& frame, std::string shape, std::size_t id)
-      : vehicle_(vehicle), frame_(frame), shape_(std::move(shape)), id_(id), scale_(0.48 * kSide / frame.reach) {}
+      : vehicle_(vehicle), frame_(frame), shape_(std::move(shape)), id_(id), scale_(0.45 * kSide / frame.reach) {}
 
   [[nodiscard]] std::string drawn() const {
     std::string drawn;
@@ -90,8 +90,9 @@ class ShapePicture {
     const auto hubs = hubs_of(vehicle_, shape_);
     const auto occlusions = occlusions_of(vehicle_, shape_);
     for (std::size_t i = 0; i < hubs.size(); ++i) drawn += rotor(i, place_of(hubs[i]), occlusions[i]);
+    for (std::size_t i = 0; i < hubs.size(); ++i) drawn += label(i, place_of(hubs[i]), occlusions[i]);
     drawn += fmt::format("<path d=\"M0,{:.1f} l-6,12 h12 Z\"/>\n", -0.5 * kSide - kNose + 1);
-    return drawn + fmt::format("<text y=\"{:g}\" text-anchor=\"middle\" font-size=\"16\">{}</text>\n",
+    return drawn + fmt::format("<text y=\"{:g}\" text-anchor=\"middle\" font-size=\"18\">{}</text>\n",
                                0.5 * kSide + 0.6 * kCaption, shape_);
   }
 
@@ -128,11 +129,17 @@ class ShapePicture {
     drawn += fmt::format(
         "<circle class=\"disk\" {} fill=\"none\" stroke=\"#0b62c4\" stroke-width=\"2\" stroke-dasharray=\"5 4\"/>\n",
         disk);
-    // Beside the hub, on the side that points away from the body.
+    return drawn;
+  }
+
+  /// Beside the hub, on the side that points away from the body, over all lines.
+  [[nodiscard]] std::string label(std::size_t i, Place hub, Radians phi) const {
+    const Place at = on_paper(hub);
     const double away = std::max(distance({}, hub), 1e-9), out = 0.45 * scale_ * frame_.radius / away;
-    return drawn +
-           fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" font-size=\"12\">{}{} {:.3g}°</text>\n",
-                       at.x - out * hub.y, at.y - out * hub.x + 4, i + 1, sense(i), to_degrees(phi));
+    return fmt::format(
+        "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" font-size=\"15\" paint-order=\"stroke\" "
+        "stroke=\"#fff\" stroke-width=\"4\">{}{} {:.3g}°</text>\n",
+        at.x - out * hub.y, at.y - out * hub.x + 5, i + 1, sense(i), to_degrees(phi));
   }
 
   /// A drag torque that points up is of a rotor that turns clockwise.
@@ -191,20 +198,21 @@ std::string draw_shapes(const Vehicle& vehicle) {
   const auto shapes = shapes_of(vehicle);
   std::string drawn;
   for (std::size_t i = 0; i < shapes.size(); ++i)
-    drawn += fmt::format("<g transform=\"translate({:g},{:g})\">\n{}</g>\n", kSide * (static_cast<double>(i) + 0.5),
-                         kNose + 0.5 * kSide, ShapePicture(vehicle, frame, shapes[i], i).drawn());
+    drawn += fmt::format("<g transform=\"translate({:g},{:g})\">\n{}</g>\n", kSide * (static_cast<double>(i % 2) + 0.5),
+                         kRow * static_cast<double>(i / 2) + kNose + 0.5 * kSide,
+                         ShapePicture(vehicle, frame, shapes[i], i).drawn());
   const std::string title =
       "The vehicle from above in its shapes: body, arms, disks dashed, what the body covers of them";
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" height=\"{1}\" role=\"img\" "
       "aria-label=\"{2}\" fill=\"currentColor\" font-family=\"sans-serif\">\n<title>{2}</title>\n{3}</svg>\n",
-      kSide * static_cast<int>(shapes.size()), kNose + kSide + kCaption, title, drawn);
+      2 * kSide, kRow * ((static_cast<int>(shapes.size()) + 1) / 2), title, drawn);
 }
 
 std::vector<std::string> shapes_in_characters(const Vehicle& vehicle) {
   const Frame frame = frame_of(vehicle);
   const auto shapes = shapes_of(vehicle);
-  std::vector<std::string> lines;
+  std::vector<std::string> lines{"from above, the nose up; '#' of a disk is covered by the body ':'"};
   for (std::size_t i = 0; i < shapes.size(); i += 2) {
     auto left = in_characters(vehicle, frame, shapes[i]);
     if (i + 1 < shapes.size()) {

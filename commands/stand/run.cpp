@@ -235,21 +235,22 @@ void add_run(CLI::App& program, ExitCode& exit_code) {
       ->type_name("");
   add_value(command, "--bench", "FILE", options.bench, "bench file")->required();
   add_value(command, "--out", "DIR", options.out, "parent folder of the campaign's folder")->capture_default_str();
+  command.add_flag("--dry-run", options.dry_run, "check and print the plan and every limit; touch no device");
   add_value(command, "--resume", "DIR", options.resume,
             "resume the campaign of this folder at its first unfinished run")
       ->check(kExistingFolder);
   command.add_flag("--accept-changes", options.accept_changes, "resume although files, program or devices changed")
       ->needs("--resume");
-  command.add_flag("--dry-run", options.dry_run, "check and print the plan and every limit; touch no device");
+  add_value(command, "--want", "\"WHAT PERCENT %\"", options.wishes,
+            "after each run, tell how far it is to this (see kphi plan); may be repeated")
+      ->allow_extra_args(false);
+  add_live_options(command, options.live);
+  begin_group(command, "Without a person");
   auto* yes = command.add_flag("--yes", options.yes, "take every mounting as done (for a simulated bench)");
   add_value(command, "--answers", "FILE", options.answers,
             "file with the operator's answers, for a run without a terminal")
       ->excludes(yes);
-  add_value(command, "--want", "\"WHAT PERCENT %\"", options.wishes,
-            "after each run, tell how far it is to this (see kphi plan); may be repeated")
-      ->allow_extra_args(false);
   command.add_flag("--json", options.json, "print the result as one JSON object");
-  add_live_options(command, options.live);
 }
 
 }  // namespace kphi::commands

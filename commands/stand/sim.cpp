@@ -198,8 +198,6 @@ void add_sim(CLI::App& program, ExitCode& exit_code) {
             "write the true coefficients of the simulated propellers to FILE (YAML)");
   add_value(sim, "--faults", "FILE", options.faults,
             "fault script of wires and devices (YAML; default: the bench file's)");
-  add_value(sim, "--truth-log", "FILE", options.truth_log,
-            "write at exit what became of every datagram, reply and motor command to FILE (JSON lines)");
   sim.add_option("--time-scale", options.time_scale, "bench seconds per second (default: the bench file's)")
       ->check(CLI::Range(0.1, 1000.0));
   sim.add_option("--seed", options.seed, "seed of the noise (default: the bench file's)");
@@ -207,6 +205,13 @@ void add_sim(CLI::App& program, ExitCode& exit_code) {
             "write a copy of the bench file with the actual addresses to FILE");
   sim.add_flag("--free-ports", options.free_ports,
                "listen on any free ports instead of the bench file's; see --resolved");
+  auto* mount = sim.add_option("--mount", options.mount,
+                               "tell the running simulator the mounted propeller and occlusion: \"5x3 90\"");
+  sim.add_flag("--status", options.status, "print the state of the running simulator as one line of JSON")
+      ->excludes(mount);
+  begin_group(sim, "Developers: the motor module and its line");
+  add_value(sim, "--truth-log", "FILE", options.truth_log,
+            "write at exit what became of every datagram, reply and motor command to FILE (JSON lines)");
   sim.add_option("--clock-gain", options.clock_gain,
                  "relative error of the motor module's clock, about 0.005 in a real one (default 0)")
       ->check(CLI::Range(-0.05, 0.05));
@@ -217,10 +222,6 @@ void add_sim(CLI::App& program, ExitCode& exit_code) {
       ->check(CLI::Range(0.0, 255.0));
   sim.add_flag("--paced", options.paced, "transmit the motor's bytes at its baud rate, not at once");
   sim.add_flag("--legacy", options.legacy, "simulate a motor module with old firmware");
-  auto* mount = sim.add_option("--mount", options.mount,
-                               "tell the running simulator the mounted propeller and occlusion: \"5x3 90\"");
-  sim.add_flag("--status", options.status, "print the state of the running simulator as one line of JSON")
-      ->excludes(mount);
 }
 
 }  // namespace kphi::commands

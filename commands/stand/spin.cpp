@@ -91,7 +91,7 @@ std::filesystem::path file_of(const SpinOptions& options, const Bench& bench) {
 }
 
 /// The doubts that are at this speed: once more at the end, since a log scrolls away.
-void summarise(const SpinResult& result, const profiles::BenchConfig& config, bool json) {
+void summarise(const SpinResult& result, const profiles::BenchConfig& config, bool json, Progress& printed) {
   Json all{{"file", result.run.file.string()},
            {"lost", result.run.account.lost_network + result.run.account.lost_host}};
   all["held"] = Json::array();
@@ -112,7 +112,8 @@ void summarise(const SpinResult& result, const profiles::BenchConfig& config, bo
     doubt = doubt_about_signs(result.held.back().thrust_n, result.held.back().torque_nm, config.iq.spin);
   if (doubt) all["doubt"] = *doubt;
   if (result.held.empty()) text = "no speed was held for long enough to be measured\n";
-  put(stderr, text + (doubt ? "warning: " + *doubt + "\n" : ""));
+  printed.say(text.substr(0, text.size() - 1));  // which clears the live line first
+  if (doubt) printed.say("warning: " + *doubt);
   put(stdout, (json ? all.dump() : result.run.file.string()) + "\n");
 }
 
@@ -153,7 +154,7 @@ ExitCode spin(const SpinOptions& options) {
           {*bench, campaign, config, *person, *progress, stop_asked, speeds, keys, file_of(options, *bench)});
     });
     terminal.end_keys();
-    summarise(result, config, options.json);
+    summarise(result, config, options.json, printed);
   });
   return ExitCode::ok;
 }
@@ -169,23 +170,24 @@ void add_spin(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--percent", "P", options.percent, "speed to begin with, of the highest that is allowed")
       ->check(CLI::Range(0.1, 100.0))
       ->excludes(rpm);
-  add_value(command, "--for", "SECONDS", options.for_s, "stop after SECONDS at the first speed")
-      ->check(CLI::Range(0.1, 3600.0));
-  add_value(command, "--slew", "RPM/S", options.slew_rpm_s, "change speed no faster")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 1e5));
   add_value(command, "--step", "RPM", options.step_rpm, "change of speed by a key")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1e4));
-  add_value(command, "--dead-man", "SECONDS", options.dead_man_s, "without --for: stop after SECONDS without a key")
-      ->capture_default_str()
-      ->check(CLI::Range(1.0, 600.0));
+  add_value(command, "--for", "SECONDS", options.for_s, "stop after SECONDS at the first speed")
+      ->check(CLI::Range(0.1, 3600.0));
   add_value(command, "--campaign", "FILE", options.campaign, "propeller and limits of this campaign")
       ->check(kExistingFile);
   add_value(command, "--out", "DIR", options.out, "folder of the record")->capture_default_str();
+  add_live_options(command, options.live);
+  begin_group(command, "Without a person, and fine tuning");
+  add_value(command, "--slew", "RPM/S", options.slew_rpm_s, "change speed no faster")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1e5));
+  add_value(command, "--dead-man", "SECONDS", options.dead_man_s, "without --for: stop after SECONDS without a key")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 600.0));
   command.add_flag("--yes", options.yes, "nobody is near the propeller: do not ask");
   command.add_flag("--json", options.json, "print the result as one JSON object");
-  add_live_options(command, options.live);
 }
 
 }  // namespace kphi::commands

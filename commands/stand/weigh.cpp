@@ -187,21 +187,22 @@ void add_weigh(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--kg", "KG", options.kg, "the mass")->required()->check(CLI::Range(0.001, 1000.0));
   add_value(command, "--u-kg", "KG", options.u_kg, "its standard uncertainty (default: a weight of class M3, 0.03 %)")
       ->check(CLI::Range(0.0, 100.0));
+  add_value(command, "--axis", "x|y|z", options.axis, "axis of the cell that it pulls along (default: thrust_axis)")
+      ->check(CLI::IsMember({"x", "y", "z"}));
+  add_value(command, "--out", "DIR", options.out, "folder of the record, beside the campaigns")->capture_default_str();
+  add_live_options(command, options.live);
+  begin_group(command, "Without a person, and fine tuning");
   add_value(command, "--g", "M/S2", options.gravity,
             "gravity of the place: 9.780 at the equator, 9.806 at 45°, 9.832 at a pole (default: anywhere)")
       ->check(CLI::Range(9.7, 9.9));
-  add_value(command, "--axis", "x|y|z", options.axis, "axis of the cell that it pulls along (default: thrust_axis)")
-      ->check(CLI::IsMember({"x", "y", "z"}));
   add_value(command, "--times", "N", options.times, "on and off N times")
       ->capture_default_str()
       ->check(CLI::Range(1, 100));
   add_value(command, "--seconds", "S", options.seconds, "of samples each time")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 60.0));
-  add_value(command, "--out", "DIR", options.out, "folder of the record, beside the campaigns")->capture_default_str();
   command.add_flag("--yes", options.yes, "ask nobody: the bench is simulated, or a robot moves the mass");
   command.add_flag("--json", options.json, "print the result as one JSON object");
-  add_live_options(command, options.live);
 }
 
 }  // namespace kphi::commands

@@ -240,7 +240,8 @@ class CampaignRun {
   /// Time left never grows without a word.
   void promise(double left_s, double after_this_run_s) {
     const double longer_s = to_seconds(bench_.clock().shrunk(from_seconds(left_s - promised_s_.value_or(left_s))));
-    if (longer_s > 1) progress_.say(fmt::format("time left: {:.0f} s more than said before", longer_s));
+    if (longer_s > 1)
+      progress_.say(fmt::format("time left: {:.0f} s more than said before, {} runs in all", longer_s, planned_));
     promised_s_ = after_this_run_s;
   }
 

@@ -306,7 +306,7 @@ std::string answer_text(const PlanQuestion& question, const PlanAnswer& answer) 
         fmt::format("{:<5} as written is limited by {}\n", answer.told[i].name(), row_words(answer.as_written.told[i]));
   const std::vector<std::string> assumed = answer.as_written.told.front().assumed();
   if (!assumed.empty())
-    text += fmt::format("assumed in ±, since not measured: {} (see --u)\n", fmt::join(assumed, ", "));
+    text += fmt::format("assumed in ±, since not measured: {} (see `--u`)\n", fmt::join(assumed, ", "));
   for (const Unreachable& one : answer.unreachable)
     text +=
         fmt::format("{} {}: not to be reached here; {} remain with {} repetitions, limited by {}\n", one.wish.of.name(),

@@ -189,15 +189,21 @@ const char* name_of(Verdict verdict) {
   return names[static_cast<std::size_t>(verdict)];
 }
 
+std::span<const PaperShare> paper_shares_of(const Identification& propeller) {
+  if (propeller.blades != 3 || std::abs(propeller.diameter_in - 5) >= 0.01) return {};
+  return kPaperShares;
+}
+
 std::vector<Claim> test_claims(std::span<const Fitted> family) {
   std::vector<Claim> claims;
   for (const Fitted& member : family) claims.push_back(linear(member));
   const Air air = common_air(family);
   const Fitted* drone = find(family, 5, 3);
-  claims.push_back(judged("share_45", "5-inch 3-blade at 45 deg: almost 90 % of its thrust, 0.87 to 0.91", "1",
-                          share_of_thrust(drone, 45), 0.87, 0.91));
-  claims.push_back(judged("share_270", "5-inch 3-blade at 270 deg: 25 % of its thrust, 0.22 to 0.28", "1",
-                          share_of_thrust(drone, 270), 0.22, 0.28));
+  for (const auto& [phi, share, lower, upper, words] : kPaperShares)
+    claims.push_back(
+        judged(fmt::format("share_{}", phi),
+               fmt::format("5-inch 3-blade at {} deg: {} of its thrust, {} to {}", phi, words, lower, upper), "1",
+               share_of_thrust(drone, phi), lower, upper));
   claims_of_diameter(family, air, 5, 0.4e-8, claims);
   claims_of_diameter(family, air, 6, 0.5e-8, claims);
   const double power = std::pow(6.0 / 5.0, 4);

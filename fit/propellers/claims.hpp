@@ -32,6 +32,16 @@ struct Claim {
   bool is_p = false;  ///< the value is the p of a test that would reject the claim below `allowed_lower`; no interval
 };
 
+/// What the paper says of its 5-inch three-blade propeller: the share of the thrust that an occlusion leaves at 19,100
+/// RPM, and between which shares "almost 90 %" and "25 %" still hold.
+struct PaperShare {
+  double phi_deg, share, lower, upper;
+  const char* words;
+};
+inline constexpr PaperShare kPaperShares[] = {{45, 0.90, 0.87, 0.91, "almost 90 %"}, {270, 0.25, 0.22, 0.28, "25 %"}};
+/// Empty for a propeller of which the paper gives no share.
+[[nodiscard]] std::span<const PaperShare> paper_shares_of(const Identification& propeller);
+
 /// All claims, also those that these propellers cannot test. The paper gives no tolerances; those in the table are
 /// chosen so that its claims do not contradict each other (doubling per inch and both offsets cannot hold exactly
 /// together). Propellers are compared in standard air if the air of all is known.

@@ -44,6 +44,11 @@ Cells run_row(const RunProvenance& run, const StepSelection& selection) {
   return cells;
 }
 
+std::string sentence(const char* term, const std::string& description) {
+  return fmt::format("<dt>{}</dt><dd>{}</dd>\n", term, typeset(description));
+}
+
+/// A name or a number, which stays as it is.
 std::string entry(const char* term, const std::string& description) {
   return fmt::format("<dt>{}</dt><dd>{}</dd>\n", term, html_escaped(description));
 }
@@ -126,9 +131,9 @@ std::string provenance_section(const Identification& identification, const Prove
   std::string html = html_heading("Provenance") + "<dl>\n";
   html += entry("Campaign", known(provenance.campaign));
   html += entry("Fitted from", provenance.source);
-  html += entry("Model", "T = k ω²: " + estimator_words(identification));
-  html += entry("k(φ)", identification.alone() ? "none: no occlusion was measured"
-                                               : curve.model().words(curve) + ", points " + points);
+  html += sentence("Model", "T = k ω²: " + estimator_words(identification));
+  html += sentence("k(φ)", identification.alone() ? "none: no occlusion was measured"
+                                                  : curve.model().words(curve) + ", points " + points);
   if (speeds_known(identification))
     html += entry("Speeds", html_rpm(identification.speed_min_rad_s) + " to " +
                                 html_rpm(identification.speed_max_rad_s) + " RPM");
@@ -138,7 +143,7 @@ std::string provenance_section(const Identification& identification, const Prove
   html += entry("Air density", air ? fmt::format("{:.4f} ± {:.4f} kg/m³", air->value, air->u) : "unknown");
   const auto& supply = provenance.supply_v;
   html += entry("Supply", supply && std::isfinite(*supply) ? fmt::format("{:g} V", *supply) : "unknown");
-  if (provenance.clock) html += entry("Motor's clock", clock_words(*provenance.clock));
+  if (provenance.clock) html += sentence("Motor's clock", clock_words(*provenance.clock));
   html += entry("Origin", name_of(provenance.origin));
   html += entry("Date", known(provenance.measured_utc));
   html += entry("Fitted by", "kphi " + provenance.tool_version);

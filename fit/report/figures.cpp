@@ -11,11 +11,15 @@
 #include "base/statistics.hpp"
 #include "compensation/units.hpp"
 #include "fit/model/torque_power.hpp"
+#include "fit/propellers/claims.hpp"
 
 namespace kphi::fit {
 namespace {
 
 using Curves = std::vector<std::string>;
+
+constexpr int kHalf =
+    600;  // width of a figure that stands beside another: its words are then as large as those of a whole
 
 double rpm(double speed_rad_s) { return to_rpm(RadPerSec(speed_rad_s)); }
 
@@ -23,14 +27,13 @@ std::string symmetric_axis(double reach) {
   return fmt::format("set yrange [{:.6g}:{:.6g}]\nset xzeroaxis lt 1 lc rgb '#999999'\n", -reach, reach);
 }
 
-/// Half of a symmetric axis: the largest |value| without the outliers, rounded up to a tick.
-double axis_reach(std::vector<double> values, double least) {
-  for (double& value : values) value = std::abs(value);
-  std::ranges::sort(values);
-  const double most = values.empty() ? least : values[values.size() - 1 - values.size() / 50];
-  const double reach = std::max(least, 1.25 * most);
+/// Half of a symmetric axis: the largest |value|, rounded up to a tick.
+double axis_reach(const std::vector<double>& values, double least) {
+  double most = least;
+  for (const double value : values) most = std::max(most, std::abs(value));
+  const double reach = std::max(least, 1.1 * most);
   const double unit = std::pow(10, std::floor(std::log10(reach)));
-  return unit * std::ceil(reach / unit * 2) / 2;
+  return reach <= unit ? unit : 2 * unit * std::ceil(reach / unit / 2);
 }
 
 // ---- the paper's figure ------------------------------------------------------------------------------------
@@ -81,7 +84,40 @@ std::string share_axes(const Identification& identification, const std::vector<T
       top / 100 * K_T * 1e6, tics, width);
 }
 
-Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& shares) {
+/// Another campaign and the paper behind the paper's figure: data, curves, and what the caption says.
+void add_ghosts(const Identification& identification, const DrawnBeside& beside, Figure& figure, std::string& data,
+                Curves& curves) {
+  if (beside.earlier != nullptr) {
+    const Identification& one = beside.earlier->identification;
+    std::string points, fitted;
+    for (std::size_t i = 0; i < one.table.size(); ++i) {
+      const double phi = one.table[i].phi_deg, expanded = beside.earlier->analysis.coefficients[i].expanded();
+      points += fmt::format("{:.6g} {:.8g} {:.8g}\n", phi, one.table[i].k * 1e6, expanded * 1e6);
+      figure.csv += csv_row(std::string("earlier_k_n_s2_per_rad2"), phi, one.table[i].k, expanded);
+      if (!one.alone() && phi >= one.first_fitted_deg())
+        fitted += fmt::format("{:.6g} {:.8g}\n", phi, one.curve().at(from_degrees(phi)).value() * 1e6);
+    }
+    data += data_block("earlier", points) + data_block("earlier_line", fitted);
+    if (!fitted.empty())
+      curves.push_back("$earlier_line using 1:2 axes x1y2 with lines dt 3 lw 1.5 lc rgb '#767676' notitle");
+    curves.push_back(
+        "$earlier using 1:2:3 axes x1y2 with yerrorbars pt 6 ps 1.1 lw 1.2 lc rgb '#767676' title 'earlier campaign'");
+    figure.caption += fmt::format(" Grey rings: k of an earlier campaign, {}.", beside.earlier_words);
+  }
+  const auto said = beside.paper ? paper_shares_of(identification) : std::span<const PaperShare>();
+  if (said.empty()) return;
+  std::string rows, words;
+  for (const PaperShare& one : said) {
+    rows += fmt::format("{:g} {:g}\n", one.phi_deg, 100 * one.share);
+    figure.csv += csv_row(std::string("paper_percent"), one.phi_deg, 100 * one.share, std::string());
+    words += fmt::format("{}{} at {:g}°", words.empty() ? "" : " and ", one.words, one.phi_deg);
+  }
+  data += data_block("paper", rows);
+  curves.push_back("$paper using 1:2 with points pt 12 ps 1.8 lw 1.8 lc rgb '#6a3fc0' title 'the paper'");
+  figure.caption += fmt::format(" Diamonds: the paper's values of this propeller, {}.", words);
+}
+
+Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& shares, const DrawnBeside& beside) {
   const Identification& identification = fitted.identification;
   const bool at = identification.at_speed_rad_s > 0;
   Figure figure{
@@ -122,6 +158,7 @@ Figure share_figure(const Fitted& fitted, const std::vector<ThrustShares>& share
       {"$before using 1:2 axes x1y2 with lines dt 2 lw 1.5 lc rgb '#D55E00' notitle",
        "$line using 1:2 axes x1y2 with lines lw 2.5 lc rgb '#D55E00' title 'fitted k(φ)'",
        "$k using 1:2:3 axes x1y2 with yerrorbars pt 7 ps 0.6 lw 1.4 lc rgb '#222222' title 'k of each occlusion'"});
+  add_ghosts(identification, beside, figure, data, curves);
   figure.script = figure_head() + data + share_axes(identification, shares) + plot(curves);
   return figure;
 }
@@ -160,13 +197,13 @@ Figure thrust_figure(const Identification& identification) {
     residual_plots.push_back(
         fmt::format("$points{} using 1:3 with points pt {} ps 0.4 lc rgb '{}' notitle", i, shape, colour));
   }
-  figure.script = figure_head(640) + data +
-                  "set multiplot\nset lmargin at screen 0.1\nset rmargin at screen 0.97\n"
-                  "set tmargin at screen 0.97\nset bmargin at screen 0.40\n"
+  figure.script = figure_head(520, kHalf) + data +
+                  "set multiplot\nset lmargin at screen 0.12\nset rmargin at screen 0.97\n"
+                  "set tmargin at screen 0.97\nset bmargin at screen 0.42\n"
                   "set xrange [0:*]\nset yrange [*<0:*]\nset format x ''\nset ylabel 'thrust T, N'\n"
                   "set key top left samplen 1 spacing 1.2\n" +
                   plot(fits) +
-                  "set tmargin at screen 0.36\nset bmargin at screen 0.11\nset format x '%g'\n"
+                  "set tmargin at screen 0.38\nset bmargin at screen 0.14\nset format x '%g'\n"
                   "set xlabel 'ω², 10⁶ (rad/s)²'\nset ylabel 'T − k ω², mN'\nunset key\n" +
                   symmetric_axis(axis_reach(residuals, 1)) + plot(residual_plots) + "unset multiplot\n";
   return figure;
@@ -181,7 +218,7 @@ Figure speed_figure(const Identification& identification) {
       {},
       "phi_deg,speed_rpm,k_n_s2_per_rad2,standard_error,percent_of_fitted\n"};
   std::string data, panels;
-  std::vector<double> deviations;
+  std::vector<double> deviations, reaches;
   const std::size_t last = identification.table.size() - 1;
   for (std::size_t i = 0; i <= last; ++i) {
     const OcclusionCoefficient& row = identification.table[i];
@@ -193,26 +230,28 @@ Figure speed_figure(const Identification& identification) {
       const auto [k, u, mean_speed, repetitions] = k_at_speed(points);
       const double error = repetitions > 1 ? u : 0;
       deviations.push_back(100 * (k / row.k - 1));
+      reaches.push_back(std::abs(deviations.back()) + 100 * error / row.k);
       rows += fmt::format("{:.6g} {:.6g} {:.6g}\n", rpm(at), deviations.back(), 100 * error / row.k);
       figure.csv += csv_row(row.phi_deg, rpm(at), k, error, deviations.back());
     }
     const auto [colour, shape] = mark(i);
     data += data_block(fmt::format("k{}", i), rows);
     panels +=
-        fmt::format("{}{}set label 1 'φ = {}°' at graph 0.985, graph 0.86 right tc rgb '{}'\n",
+        fmt::format("{}{}set label 1 'φ = {}°' at graph 0.985, graph 0.86 right tc rgb '#222222'\n",
                     i > 0 ? "unset label 2\n" : "", i == last ? "set format x '%g'\nset xlabel 'speed, RPM'\n" : "",
-                    csv_cell(row.phi_deg), colour) +
+                    csv_cell(row.phi_deg)) +
         plot({"0 with lines lw 0.6 lc rgb '#999999' notitle",
               fmt::format("$k{} using 1:2:3 with yerrorbars pt {} ps 0.5 lw 0.8 lc rgb '{}' notitle", i, shape, colour),
               fmt::format("$k{} using 1:2 with lines lw 1 lc rgb '{}' notitle", i, colour)});
   }
-  figure.script = figure_head() + data + symmetric_axis(axis_reach(deviations, 1)) +
-                  fmt::format("set format x ''\nset ytics {0:.6g},{1:.6g},{1:.6g}\n", -axis_reach(deviations, 1) / 2,
-                              axis_reach(deviations, 1) / 2) +
-                  "set label 2 'k at one speed relative to k of the range, %' at screen 0.018, "
-                  "screen 0.5 center rotate by 90\n" +
-                  fmt::format("set multiplot layout {},1 margins 0.1,0.97,0.16,0.97 spacing 0.02\n", last + 1) +
-                  panels + "unset multiplot\n";
+  const double reach = axis_reach(reaches, 1);
+  figure.script =
+      figure_head(520, kHalf) + data + symmetric_axis(reach) +
+      fmt::format("set format x ''\nset xrange [0:*]\nset ytics {0:.6g},{1:.6g},{1:.6g}\n", -reach / 2, reach / 2) +
+      "set label 2 'k at one speed relative to k of the range, %' at screen 0.018, "
+      "screen 0.5 center rotate by 90\n" +
+      fmt::format("set multiplot layout {},1 margins 0.15,0.94,0.14,0.97 spacing 0.02\n", last + 1) + panels +
+      "unset multiplot\n";
   return figure;
 }
 
@@ -249,7 +288,7 @@ Figure repetition_figure(const Identification& identification) {
         fmt::format("$repetition{} using 1:2:3 with yerrorbars pt {} ps 0.8 lw 1.2 lc rgb '{}' title 'repetition {}'",
                     repetition, shape, colour, repetition));
   }
-  figure.script = figure_head(400) + data +
+  figure.script = figure_head(360, kHalf) + data +
                   fmt::format("set xrange [-0.6:{}]\nset xtics ({})\nset xzeroaxis lt 1 lc rgb '#999999'\n",
                               static_cast<double>(identification.table.size()) - 0.4, tics) +
                   "set offsets 0, 0, graph 0.1, graph 0.1\n"
@@ -279,10 +318,34 @@ Figure power_figure(const Identification& identification) {
     curves.push_back(fmt::format("$power{} using 1:2 with linespoints pt {} ps 0.5 lw 1.2 lc rgb '{}' title 'φ = {}°'",
                                  i, mark(i).shape, mark(i).colour, csv_cell(phi_deg)));
   }
-  figure.script = figure_head(400) + data +
+  figure.script = figure_head(360, kHalf) + data +
                   "set xrange [0:*]\nset yrange [0:*]\nset xlabel 'thrust, N'\nset ylabel 'thrust per power, g/W'\n"
                   "set key top right samplen 1 spacing 1.2\n" +
                   plot(curves);
+  return figure;
+}
+
+/// Speed above thrust over time, from `from_s` on.
+Figure over_time(const Settling& shown, Figure figure, double from_s, const std::string& marks, const char* time) {
+  std::string speed, thrust;
+  for (const Settling::Sample& sample : shown.speed_rad_s) {
+    speed += fmt::format("{:.5g} {:.8g}\n", sample.time_s, rpm(sample.value));
+    figure.csv += csv_row(std::string("speed_rad_s"), sample.time_s, sample.value);
+  }
+  for (const Settling::Sample& sample : shown.thrust_n) {
+    thrust += fmt::format("{:.5g} {:.8g}\n", sample.time_s, sample.value);
+    figure.csv += csv_row(std::string("thrust_n"), sample.time_s, sample.value);
+  }
+  figure.script =
+      figure_head(440, kHalf) + data_block("speed", speed) + data_block("thrust", thrust) + marks +
+      fmt::format(
+          "set multiplot\nset lmargin at screen 0.17\nset rmargin at screen 0.97\nunset key\nset xrange [{:.6g}:*]\n",
+          from_s) +
+      "set tmargin at screen 0.97\nset bmargin at screen 0.60\nset format x ''\nset ylabel 'speed, RPM' offset 1\n" +
+      plot({"$speed using 1:2 with lines lw 1.4 lc rgb '#0072B2'"}) +
+      fmt::format("set tmargin at screen 0.55\nset bmargin at screen 0.18\nset format x '%g'\nset xlabel '{}'\n",
+                  time) +
+      "set ylabel 'thrust, N'\n" + plot({"$thrust using 1:2 with lines lw 1.2 lc rgb '#D55E00'"}) + "unset multiplot\n";
   return figure;
 }
 
@@ -293,28 +356,20 @@ Figure settling_figure(const Settling& settling) {
                             settling.run, rpm(settling.commanded_rad_s)),
                 {},
                 "kind,time_s,value\n"};
-  std::string speed, thrust;
-  for (const Settling::Sample& sample : settling.speed_rad_s) {
-    speed += fmt::format("{:.5g} {:.8g}\n", sample.time_s, rpm(sample.value));
-    figure.csv += csv_row(std::string("speed_rad_s"), sample.time_s, sample.value);
-  }
-  for (const Settling::Sample& sample : settling.thrust_n) {
-    thrust += fmt::format("{:.5g} {:.8g}\n", sample.time_s, sample.value);
-    figure.csv += csv_row(std::string("thrust_n"), sample.time_s, sample.value);
-  }
-  figure.script =
-      figure_head(520) + data_block("speed", speed) + data_block("thrust", thrust) +
-      fmt::format(
-          "set object 1 rectangle from {:.6g}, graph 0 to {:.6g}, graph 1 behind fillcolor rgb '#eef1f4' "
-          "fillstyle solid noborder\nset multiplot\nset lmargin at screen 0.13\nset rmargin at screen 0.97\nunset key\n"
-          "set xrange [-0.15:{:.6g}]\nset arrow 1 from 0, graph 0 to 0, graph 1 nohead dt 2 lc rgb '#777777'\n",
-          settling.window_begin_s, settling.window_end_s, settling.window_end_s + 0.05) +
-      "set tmargin at screen 0.97\nset bmargin at screen 0.57\nset format x ''\nset ylabel 'speed, RPM' offset 1\n" +
-      plot({"$speed using 1:2 with linespoints pt 7 ps 0.35 lw 1.2 lc rgb '#0072B2'"}) +
-      "set tmargin at screen 0.53\nset bmargin at screen 0.13\nset format x '%g'\n"
-      "set xlabel 'time since the command, s'\nset ylabel 'thrust, N'\n" +
-      plot({"$thrust using 1:2 with lines lw 1.2 lc rgb '#D55E00'"}) + "unset multiplot\n";
-  return figure;
+  return over_time(settling, std::move(figure), -0.15,
+                   fmt::format("set object 1 rectangle from {:.6g}, graph 0 to {:.6g}, graph 1 behind fillcolor rgb "
+                               "'#eef1f4' fillstyle solid noborder\n"
+                               "set arrow 1 from 0, graph 0 to 0, graph 1 nohead dt 2 lc rgb '#777777'\n",
+                               settling.window_begin_s, settling.window_end_s),
+                   "time since the command, s");
+}
+
+Figure run_figure(const Settling& whole) {
+  Figure figure{"whole_run",
+                fmt::format("Speed and thrust of all of {}, from its first zero to its last.", whole.run),
+                {},
+                "kind,time_s,value\n"};
+  return over_time(whole, std::move(figure), 0, "", "time since the beginning of the run, s");
 }
 
 /// No quote and no control character: gnuplot would take them for the end of the title.
@@ -386,10 +441,10 @@ Figure family_figure(std::span<const Fitted> family) {
 }
 
 Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares, const std::filesystem::path& folder,
-                     const std::string& gnuplot, const Settling* settling) {
+                     const std::string& gnuplot, const DrawnBeside& beside) {
   const Identification& identification = fitted.identification;
   std::vector<Figure> wanted;
-  if (!identification.alone()) wanted.push_back(share_figure(fitted, shares));
+  if (!identification.alone()) wanted.push_back(share_figure(fitted, shares, beside));
   if (std::ranges::all_of(identification.table, [](const auto& row) { return row.fit.has_value(); })) {
     wanted.push_back(thrust_figure(identification));
     wanted.push_back(speed_figure(identification));
@@ -398,7 +453,9 @@ Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shar
     if (repeated || !identification.alone()) wanted.push_back(repetition_figure(identification));
   }
   if (!power_of(identification.selection.used).empty()) wanted.push_back(power_figure(identification));
-  if (settling != nullptr && !settling->thrust_n.empty()) wanted.push_back(settling_figure(*settling));
+  if (beside.settling != nullptr && !beside.settling->thrust_n.empty())
+    wanted.push_back(settling_figure(*beside.settling));
+  if (beside.whole != nullptr && !beside.whole->thrust_n.empty()) wanted.push_back(run_figure(*beside.whole));
   return draw(wanted, folder, gnuplot);
 }
 

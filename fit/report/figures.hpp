@@ -34,15 +34,24 @@ struct Settling {
   std::vector<Sample> thrust_n;  ///< means over bins of 10 ms, zero subtracted
 };
 
+/// What is drawn of a fit beside itself.
+struct DrawnBeside {
+  const Settling* settling = nullptr;
+  const Settling* whole = nullptr;  ///< a whole run
+  const Fitted* earlier = nullptr;  ///< another campaign of the propeller, as a ghost
+  std::string earlier_words{};      ///< its folder, origin and date
+  bool paper = false;               ///< what the paper says of this propeller
+};
+
 /// k(φ) of several propellers, and beside it k(φ)/K_T, which makes their lines comparable.
 [[nodiscard]] Figure family_figure(std::span<const Fitted> family);
 
 /// All figures that the data allow, in the order of the report: the paper's (box plots of the thrust shares over φ; on
 /// the second axis, scaled so that K_T is at 100 %, the coefficients and the curve), thrust with residuals, k against
-/// speed, repetitions, power, settling. `settling` may be null. Throws RecordError when the folder cannot be written;
+/// speed, repetitions, power, settling, a whole run. Throws RecordError when the folder cannot be written;
 /// a missing gnuplot only skips the figures.
 [[nodiscard]] Figures draw_figures(const Fitted& fitted, const std::vector<ThrustShares>& shares,
                                    const std::filesystem::path& folder, const std::string& gnuplot = "gnuplot",
-                                   const Settling* settling = nullptr);
+                                   const DrawnBeside& beside = {});
 
 }  // namespace kphi::fit

@@ -239,7 +239,7 @@ std::string plus_minus_words(const Budget& budget) {
   std::string text = "± is 95 % by the GUM";
   if (!assumed.empty()) text += fmt::format("; assumed in it, since not measured: {}", fmt::join(assumed, ", "));
   if (!missing.empty()) text += fmt::format("; unknown and not in it: {}", fmt::join(missing, ", "));
-  return text + (assumed.empty() && missing.empty() ? "" : " (see --u)");
+  return text + (assumed.empty() && missing.empty() ? "" : " (see `--u`)");
 }
 
 std::string headline_text(const Fitted& fitted) {

@@ -14,6 +14,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "base/number.hpp"
 #include "results/file_layer.hpp"
 
 extern char** environ;
@@ -108,16 +109,16 @@ Figures draw(const std::vector<Figure>& wanted, const fs::path& folder, const st
 
 Mark mark(std::size_t i) { return kMarks[i % std::size(kMarks)]; }
 
-std::string figure_head(int height) {
+std::string figure_head(int height, int width) {
   return fmt::format(
-      "set terminal svg size 800,{} noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background "
+      "set terminal svg size {},{} noenhanced font 'Helvetica,Arial,sans-serif,14' linewidth 1.2 background "
       "'#ffffff'\n"
       "set encoding utf8\nset minussign\n"
       "set border 3 lc rgb '#777777'\n"
       "set tics nomirror out scale 0.6 textcolor rgb '#333333'\n"
       "set grid ytics lc rgb '#e4e4e4' lt 1 lw 0.8\n"
       "set key opaque fillcolor rgb '#ffffff' noenhanced\n",
-      height);
+      width, height);
 }
 
 std::string data_block(const std::string& name, const std::string& rows) {

@@ -45,7 +45,7 @@ struct Mark {
 [[nodiscard]] Mark mark(std::size_t i);
 
 /// The head of every gnuplot script.
-[[nodiscard]] std::string figure_head(int height = 470);
+[[nodiscard]] std::string figure_head(int height = 470, int width = 800);
 
 /// A named block of inline data.
 [[nodiscard]] std::string data_block(const std::string& name, const std::string& rows);

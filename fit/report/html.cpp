@@ -126,6 +126,9 @@ std::string typeset(std::string_view text) {
                                     {"RPM^2", "RPM²"},
                                     {")^2", ")²"},
                                     {"D^4", "D⁴"}};
+  if (const std::size_t begin = text.find('`'), end = text.find('`', begin + 1); end != std::string_view::npos)
+    return typeset(text.substr(0, begin)) + "<code>" + html_escaped(text.substr(begin + 1, end - begin - 1)) +
+           "</code>" + typeset(text.substr(end + 1));
   std::string result = html_escaped(text);
   const auto letter = [&](std::size_t at) {
     return at < result.size() && std::isalpha(static_cast<unsigned char>(result[at])) != 0;

@@ -33,6 +33,36 @@ void for_each_sample(const results::RunRecording& run, const results::LoadCellCo
   }
 }
 
+/// Times in s: where they count from, what is shown of them, and the width of a mean of the thrust.
+struct Shown {
+  double zero, from, to, bin;
+};
+
+/// Thrust less the zero that gave `step` its mean; nullopt without a sample in its window.
+std::optional<Settling> read_into(Settling shown, const results::RunRecording& run,
+                                  const results::LoadCellColumns& cell, const results::StepMean& step,
+                                  const Shown& span) {
+  shown.window_begin_s = step.window_begin_s - span.zero;
+  shown.window_end_s = step.window_end_s - span.zero;
+  const auto inside = [&](double t) { return t >= span.from && t <= span.to; };
+  for (const MotorReading& reading : run.motor) {
+    const double t = seconds(reading.time_ns) - span.zero;
+    if (reading.channel == MotorChannel::speed && inside(t)) shown.speed_rad_s.push_back({t, std::abs(reading.value)});
+  }
+  std::map<int, std::vector<double>> bins;
+  std::vector<double> averaged;
+  for_each_sample(run, cell, [&](double time_s, double thrust_n) {
+    const double t = time_s - span.zero;
+    if (!inside(t)) return;
+    bins[static_cast<int>(std::floor(t / span.bin))].push_back(thrust_n);
+    if (t >= shown.window_begin_s && t <= shown.window_end_s) averaged.push_back(thrust_n);
+  });
+  if (averaged.empty()) return std::nullopt;
+  const double shift = step.thrust_n - mean(averaged);  // the zero
+  for (const auto& [bin, values] : bins) shown.thrust_n.push_back({(bin + 0.5) * span.bin, mean(values) + shift});
+  return shown;
+}
+
 std::vector<std::string> event_lines(const results::RunRecording& run) {
   std::vector<std::string> lines;
   for (const StreamEvent& event : run.events)
@@ -66,29 +96,19 @@ std::optional<Settling> settling_of(const results::RunRecording& run, const resu
     return mark.phase == results::Phase::step && mark.step == step.step;
   });
   if (command == run.phases.end()) return std::nullopt;
-  const double zero_s = seconds(command->time_ns);
   Settling settling;
   settling.commanded_rad_s = command->speed_rad_s;
-  settling.window_begin_s = step.window_begin_s - zero_s;
-  settling.window_end_s = step.window_end_s - zero_s;
-  const auto inside = [&](double t) { return t >= -kBefore_s && t <= settling.window_end_s; };
-  for (const MotorReading& reading : run.motor) {
-    const double t = seconds(reading.time_ns) - zero_s;
-    if (reading.channel == MotorChannel::speed && inside(t))
-      settling.speed_rad_s.push_back({t, std::abs(reading.value)});
-  }
-  std::map<int, std::vector<double>> bins;
-  std::vector<double> averaged;
-  for_each_sample(run, cell, [&](double time_s, double thrust_n) {
-    const double t = time_s - zero_s;
-    if (!inside(t)) return;
-    bins[static_cast<int>(std::floor(t / kBin_s))].push_back(thrust_n);
-    if (t >= settling.window_begin_s) averaged.push_back(thrust_n);
-  });
-  if (averaged.empty()) return std::nullopt;
-  const double shift = step.thrust_n - mean(averaged);  // the zero
-  for (const auto& [bin, values] : bins) settling.thrust_n.push_back({(bin + 0.5) * kBin_s, mean(values) + shift});
-  return settling;
+  const double zero_s = seconds(command->time_ns);
+  return read_into(settling, run, cell, step, {zero_s, -kBefore_s, step.window_end_s - zero_s, kBin_s});
+}
+
+std::optional<Settling> whole_run(const results::RunRecording& run, const results::LoadCellColumns& cell,
+                                  const results::StepMean& step) {
+  constexpr double kBins = 800;
+  if (run.phases.empty() || cell.datagrams.empty()) return std::nullopt;
+  const double begin_s = seconds(run.phases.front().time_ns),
+               lasts_s = seconds(cell.datagrams.back().arrival_ns) - begin_s;
+  return read_into({}, run, cell, step, {begin_s, 0, lasts_s, lasts_s / kBins});
 }
 
 RawSamples read_raw_samples(const Identification& identification, std::vector<RunProvenance> runs,
@@ -102,7 +122,7 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
   }
   std::map<double, std::vector<double>> by_angle;
   std::size_t found = 0;
-  std::optional<Settling> settling;
+  std::optional<Settling> settling, whole;
   results::LoadCellColumns cell;
   std::map<std::string, results::RunDigests> journal;
   if (!runs.empty()) journal = results::digests_beside(folder / runs.front().file);
@@ -122,7 +142,9 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
       if (!is_run_of(run, step)) continue;
       if (!settling) {
         settling = settling_of(recording, cell, step);
-        if (settling) settling->run = name;
+        if (settling) whole = whole_run(recording, cell, step);
+        for (auto* shown : {&settling, &whole})
+          if (*shown) (*shown)->run = name;
       }
       const auto samples = thrust_samples(recording, cell, step, kSamplesPerAngle / repetitions[step.occlusion_deg]);
       auto& all = by_angle[step.occlusion_deg];
@@ -130,7 +152,7 @@ RawSamples read_raw_samples(const Identification& identification, std::vector<Ru
       found += samples.empty() ? 0 : 1;
     }
   }
-  RawSamples result{{}, std::move(runs), std::move(settling)};
+  RawSamples result{{}, std::move(runs), std::move(settling), std::move(whole)};
   const double nominal = mean(by_angle[0]);
   if (found < top.size() || !(nominal > 0)) return result;
   for (auto& [phi_deg, samples] : by_angle) {

@@ -26,10 +26,15 @@ namespace kphi::fit {
 [[nodiscard]] std::optional<Settling> settling_of(const results::RunRecording& run,
                                                   const results::LoadCellColumns& cell, const results::StepMean& step);
 
+/// The whole run, its thrust as 800 means; its zero is that of `step`. nullopt as settling_of.
+[[nodiscard]] std::optional<Settling> whole_run(const results::RunRecording& run, const results::LoadCellColumns& cell,
+                                                const results::StepMean& step);
+
 struct RawSamples {
   std::vector<ThrustShares> shares;  ///< empty when some run of the top speed is not in the folder
   std::vector<RunProvenance> runs;  ///< those given, with outcome, account and events filled in where the file is there
-  std::optional<Settling> settling;  ///< of the top speed, from the first of the runs that have it
+  std::optional<Settling> settling;  ///< of the top speed, from the first of the runs that have it, and
+  std::optional<Settling> whole;     ///< that run from beginning to end
 };
 
 /// Reads each run once. `runs` name files below `folder`; at most 2000 samples per φ are kept.

@@ -111,9 +111,15 @@ std::string stand_section(const std::string& drawing) {
 std::string vehicle_section(const Chapter& chapter) {
   if (chapter.shapes.empty()) return {};
   return html_heading("On the vehicle") + fmt::format("<p><b>{}.</b></p>\n", typeset(chapter.vehicle)) +
-         "<figure class=\"stand\">\n" + inline_svg(chapter.shapes, "vehicle-") +
+         "<figure class=\"vehicle\">\n" + inline_svg(chapter.shapes, "vehicle-") +
          "\n<figcaption>Its shapes from above, the nose up: arms, disks (dashed) with number, sense and φ, and what of "
          "each disk the body covers.</figcaption></figure>\n";
+}
+
+std::string own_claims_section(const Fitted& fitted) {
+  std::vector<Claim> claims = test_claims({&fitted, 1});
+  std::erase_if(claims, [](const Claim& claim) { return claim.verdict == Verdict::not_tested; });
+  return claims_section(claims);
 }
 
 std::string skipped_note(const Figures& figures) {
@@ -151,7 +157,7 @@ std::string figure_section(const Figures& figures, std::size_t begin, std::size_
 }
 
 /// The first figure belongs to the headline, the others follow the table. On a page of several propellers each chapter
-/// prints on two pages: standard air, the budget and the last figures move into its appendix.
+/// prints on two pages: standard air, the budget and the last figures move into its appendix, which prints if opened.
 std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool alone) {
   const auto& [identification, analysis] = fitted;
   const Provenance& provenance = chapter.provenance;
@@ -160,15 +166,15 @@ std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool
   std::string html =
       origin_banner(provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
   html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
-          coefficient_section(fitted);
+          coefficient_section(fitted) + (chapter.claims ? own_claims_section(fitted) : "");
   if (alone) html += standard_section(fitted) + stand_section(chapter.drawing) + vehicle_section(chapter);
   html += figure_section(figures, 1, shown, "How well the model holds", number);
   const std::string more = analysis_sections(analysis) + campaign_sections(identification, provenance);
   if (alone) html += more;
   html += fmt::format(
-      "<details class=\"appendix\"><summary>Appendix: {}tests, torque, power, steps left out, runs and "
+      "<details class=\"appendix\"{}><summary>Appendix: {}tests, torque, power, steps left out, runs and "
       "their hashes</summary>\n",
-      alone ? "" : "standard air, uncertainty budget, k in flight, provenance, ");
+      alone ? " open=\"open\"" : "", alone ? "" : "standard air, uncertainty budget, k in flight, provenance, ");
   if (!alone)
     html +=
         standard_section(fitted) + figure_section(figures, shown, figures.drawn.size(), "More figures", number) + more;

@@ -19,6 +19,7 @@ struct Chapter {
   std::string drawing{};  ///< SVG of the stand and its plates; empty: nobody described a stand
   std::string vehicle{};  ///< what the verdict is on a vehicle, in words, and
   std::string shapes{};   ///< SVG of its shapes; empty: nobody named one
+  bool claims = false;    ///< the paper's statements that this propeller alone can test
 };
 
 /// The same arguments (and SVG files) give the same bytes.

@@ -49,22 +49,22 @@ supply_v: 12.0
 limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, coil_temperature_max_degc: 110}
 `;
 
-const bench = folder => `format: kphi-bench/1
+const bench = (folder, supply) => `format: kphi-bench/1
 name: browser
 netbox: {host: 127.0.0.1, rdt_port: 49152, http_port: 8049, rate_hz: 7000, records_per_datagram: 40}
 iq: {device: ${folder}/motor, baud: 921600, module_id: 0, spin: +1, telemetry_hz: 50, speed_max_rpm: 19300}
 thrust_axis: "+Fz"
-supply: {uri: "modbus-rtu:${folder}/supply?model=RD6024", voltage_v: 12, current_limit_a: 24, over_voltage_v: 14, over_current_a: 24}
+${supply ? `supply: {uri: "modbus-rtu:${folder}/supply?model=RD6024", voltage_v: 12, current_limit_a: 24, over_voltage_v: 14, over_current_a: 24}` : ''}
 simulation: {time_scale: 1, seed: 3, control: ${folder}/control}
 `;
 
 /// The simulated bench in real time: 7,000 samples a second.
 export class Bench {
-  static async start(kphi) {
+  static async start(kphi, { supply = true } = {}) {
     const bench_ = new Bench();
     bench_.kphi = kphi;
     bench_.folder = mkdtempSync(path.join(os.tmpdir(), 'kphi-browser-'));
-    writeFileSync(bench_.path('wanted.yaml'), bench(bench_.folder));
+    writeFileSync(bench_.path('wanted.yaml'), bench(bench_.folder, supply));
     writeFileSync(bench_.path('campaign.yaml'), campaign);
     bench_.sim = new Child(inRealTime(kBenchPriority, [kphi, 'sim', bench_.path('wanted.yaml'), '--free-ports', '--resolved',
       bench_.path('bench.yaml'), '--truth-log', bench_.path('wire.jsonl')]));

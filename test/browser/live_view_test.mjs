@@ -78,6 +78,20 @@ async function open(browser, url, more = {}) {
   return page;
 }
 
+const kReadings = ['thrust', 'speed', 'run', 'occlusion', 'repetition', 'step', 'left', 'supply', 'module', 'coil', 'drive', 'vibration', 'received', 'lost'];
+const readings = page => page.evaluate(ids => Object.fromEntries(ids.map(id => [id, at(id).textContent])), kReadings);
+
+/// Numbers of each axis that is shown are such as a person writes, and no two of them alike.
+async function expectReadableAxes(page) {
+  const axes = await page.evaluate(() => [...document.querySelectorAll('.chart')].filter(chart => chart.offsetParent).flatMap(chart =>
+    ['x', 'y'].map(axis => [`${chart.id} ${axis}`, [...chart.querySelectorAll(`.dygraph-axis-label-${axis}`)].map(node => node.textContent)])));
+  assert.ok(axes.length >= 2);
+  for (const [name, labels] of axes) {
+    for (const label of labels) assert.match(label, /^−?\d[\d ]*(\.\d{1,4})?$/, `${name}: ${labels}`);
+    assert.equal(new Set(labels).size, labels.length, `${name}: ${labels}`);
+  }
+}
+
 /// Until the motor of `run` turns on the page that shows it, in this repetition or a later one.
 async function turns(page, run, repetition) {
   const ended = run.ended.then(() => { throw new Error(`ended before it turned:\n${run.words}`); });
@@ -116,7 +130,7 @@ async function stopBy(how, ask, page, bench, run) {
 }
 
 const bench = await Bench.start(kphi);
-let other, browser;
+let other, unpowered, browser;
 try {
   // Without its own checks of pages that reach into this machine: ours are asked.
   const launched = playwright.chromium.launch({ executablePath: browserAt, args: ['--no-sandbox', '--disable-gpu', '--disable-features=LocalNetworkAccessChecks'] });
@@ -182,10 +196,23 @@ try {
       await seen.waitForFunction(() => state.ended);
       assert.equal(await replay.ended, 0, replay.words);
       assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY OVER');
+      assert.match(await seen.title(), /^finished – /);
+      await expectReadableAxes(seen);
       await seen.close();
     } finally {
       if (replay.code === undefined) replay.signal('SIGKILL');
     }
+  });
+
+  await it('shows every reading in a run, and axes with numbers that can be read', async () => {
+    // As they are in one frame: a run may end before the next one.
+    const shown = await (await page.waitForFunction(ids => state.steps.length >= 2 && state.trace.length > 50 && /^[123]\/3$/.test(at('step').textContent)
+      && Object.fromEntries(ids.map(id => [id, at(id).textContent])), kReadings)).jsonValue();
+    const patterns = { thrust: /^−?\d+\.\d{3}$/, speed: /^\d[\d ]*$/, run: /^\d+\/20$/, occlusion: /^90°$/, repetition: /^\d+\/20$/, step: /^[123]\/3$/,
+      left: /^\d\d:\d\d$/, supply: /^1\d\.\d\d V · \d+\.\d\d A · \d+ W$/, module: /^1\d\.\d\d V · \d+\.\d\d A · \d+ W$/, coil: /^\d+ °C$/, drive: /^no fault$/,
+      vibration: /^\d+\.\d\d N( · .*)?$/, received: /^\d[\d ]*$/, lost: /^0, 0$/ };
+    for (const id of kReadings) assert.match(shown[id], patterns[id], id);
+    await expectReadableAxes(page);
   });
 
   await it('shows k of every step, lines, and what the guard holds the bench to', async () => {
@@ -241,6 +268,9 @@ try {
     await page.mouse.move(x + 0.5 * width, y + 0.5 * height);
     await page.mouse.move(x + 0.6 * width, y + 0.5 * height);
     await page.waitForFunction(() => / s: .* N/.test(at('thrust_read').textContent));
+    assert.doesNotMatch(await page.locator('#thrust_read').innerText(), /NaN/);
+    const words = await page.evaluate(() => { text('run', '10/20'); text('repetition', '10/20'); return [...document.querySelectorAll('#where p, h2')].filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1).map(node => node.textContent); });
+    assert.deepEqual(words, [], 'words that do not fit');
     await page.mouse.down();
     await page.mouse.move(x + 0.9 * width, y + 0.5 * height, { steps: 5 });
     await page.mouse.up();
@@ -268,6 +298,25 @@ try {
     await phone.close();
   });
 
+  await it('says before the first run that there is none yet, and at its question what is to be mounted', async () => {
+    // The page as it is until the first tick, and as the question before the first run makes it.
+    const fresh = await open(browser, url, { viewport: { width: 390, height: 844 } });
+    await fresh.waitForFunction(() => state.hello && state.tick);
+    await fresh.evaluate(() => { link.onmessage = null; take.hello(state.hello); });
+    assert.equal(await fresh.title(), 'browser – kphi');
+    assert.equal(await fresh.locator('#banner').innerText(), 'Before the first run. The motor is locked.');
+    await expectReadableAxes(fresh);
+    await fresh.evaluate(() => take.ask({ text: 'Mount 90°, then type 90.', occlusion_deg: 90, repetition: 1, run: 1, has_power: false, drawing: '<svg xmlns="http://www.w3.org/2000/svg"/>' }));
+    await fresh.waitForFunction(() => at('module').textContent === 'no power');
+    const { speed, run, occlusion, repetition, step, supply } = await readings(fresh);
+    assert.deepEqual([speed, run, occlusion, repetition, step, supply], ['0', '1', '90°', '1', 'waiting', 'off']);
+    assert.equal(await fresh.title(), 'waiting – browser – kphi');
+    const [plate, thrust] = await fresh.evaluate(() => ['plate_card', 'thrust'].map(id => at(id).getBoundingClientRect().top));
+    assert.ok(plate < thrust, 'on a telephone the plate comes first');
+    await expectReadableAxes(fresh);
+    await fresh.close();
+  });
+
   await it(`coasts the motor within ${kPrompt_ms} ms of a key`, async () => {
     await turns(page, run, 2);
     await page.screenshot({ path: path.join(pictures, 'live_view.png') });  // which may outlast the repetition
@@ -283,6 +332,23 @@ try {
     await turns(page, again, 1);
     const { x, y, width, height } = await page.locator('#stop').boundingBox();
     await stopBy('click', () => page.mouse.click(x + width / 2, y + height / 2), page, other, again);
+    await page.close();
+  });
+
+  await it('shows the coast to rest after STOP where the motor keeps its power', async () => {
+    unpowered = await Bench.start(kphi, { supply: false });
+    const coasting = unpowered.run('--live');
+    const page = await open(browser, await addressOf(coasting));
+    await turns(page, coasting, 1);
+    await page.evaluate(() => { window.coast = []; });
+    await page.keyboard.press('Escape');
+    await page.evaluate(() => { const tick = take.tick; take.tick = message => { window.coast.push(message.speed_rpm); tick(message); }; });
+    assert.equal(await coasting.ended, kInterrupted, coasting.words);
+    await page.waitForFunction(() => state.ended && /^last value \d\d?, at rest$/.test(at('speed_beside').textContent));
+    const speeds = (await page.evaluate(() => window.coast)).filter(speed => speed !== null);
+    assert.ok(speeds.filter(speed => speed > 100 && speed < 5000).length >= 2, `it falls before the eyes: ${speeds}`);
+    assert.match(await page.title(), /^STOPPED – browser/);
+    await expectReadableAxes(page);
     await page.close();
   });
 
@@ -306,8 +372,8 @@ try {
     assert.ok(asked.length >= 6);
     assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
   });
-  console.log(`${results.length} of 11 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
+  console.log(`${results.length} of 14 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
 } finally {
   await browser?.close();
-  for (const each of [bench, other]) each?.clear();
+  for (const each of [bench, other, unpowered]) each?.clear();
 }

@@ -25,6 +25,7 @@ using testing::AllOf;
 using testing::AnyOf;
 using testing::ContainsRegex;
 using testing::HasSubstr;
+using testing::Not;
 namespace fs = std::filesystem;
 
 /// Name → bytes of every file in it.
@@ -94,6 +95,9 @@ TEST_F(Campaigns, OrWhatIsNoneAreNamedWithTheCommandThatTakesThem) {
   const std::string run = (campaign_ / "runs/5x3_phi090_rep1.h5").string(), steps = (campaign_ / "steps.csv").string();
   const std::string plan = (*parent_ / "campaign.yaml").string(), bench = (*parent_ / "bench.yaml").string();
   const std::string vehicle = source_dir() + "/profiles/foldable_drone.yaml";
+  const std::string answers = source_dir() + "/profiles/answers_example.yaml",
+                    faults = source_dir() + "/profiles/faults_example.yaml",
+                    coefficients = (campaign_ / "coefficients.yaml").string();
   const TemporaryFolder folder;
   const std::string log = (folder.path() / "log.csv").string(), out = (folder.path() / "out").string();
   std::ofstream(log) << "RPM,Thrust (N)\n1000,0.1\n2000,0.4\n";
@@ -108,6 +112,14 @@ TEST_F(Campaigns, OrWhatIsNoneAreNamedWithTheCommandThatTakesThem) {
       {{"compensate", "--coefficients", plan, "--vehicle", vehicle}, "this is a campaign file", "kphi run"},
       {{"replay", plan}, "this is a campaign file", "kphi run"},
       {{"import", run, "--out", out}, "this is a run file", "kphi fit"},
+      {{"fit", faults}, "this is a faults file", "kphi sim --faults"},
+      {{"info", steps}, "not a run file", "a campaign folder or a file of its runs/"},
+      {{"verify", bench}, "this is a bench file", "kphi devices"},
+      {{"run", run, "--bench", bench}, "this is a run file (HDF5), not YAML", "kphi info"},
+      {{"run", plan, "--bench", steps}, "this is a table, not YAML", "kphi import"},
+      {{"run", answers, "--bench", bench}, "this is an answers file, expected a campaign file", "kphi-campaign/1"},
+      {{"compensate", "--coefficients", coefficients, "--vehicle", log}, "this is a table, not YAML", "kphi import"},
+      {{"report", steps}, "is a file; name the campaign folder", "kphi report --help"},
   };
   for (const auto& [words, what, next] : mistakes) {
     const Answer answer = say(words);
@@ -177,6 +189,21 @@ TEST_F(Campaigns, SayWhatTheyAreAndWhatComesNext) {
               AllOf(HasSubstr("K_T         not fitted"), HasSubstr("next        kphi fit " + folder)));
   std::ofstream(copy.path() / "c/journal.jsonl", std::ios::app) << "{}\n";
   EXPECT_THAT(say({"info", folder}).out, HasSubstr("next        kphi verify " + folder));
+}
+
+TEST_F(Campaigns, SayWhatACountOfARunIsWorth) {
+  const Answer info = say({"info", (campaign_ / "runs/5x3_phi090_rep1.h5").string()});
+  EXPECT_THAT(info.out, ContainsRegex("counts_per_newton  +1000000.0\n"));
+}
+
+TEST_F(Campaigns, AreFlownWithAPictureOfTheVehicleOnATerminalAlone) {
+  const std::string line = test::kphi() + " compensate --coefficients " + (campaign_ / "coefficients.yaml").string() +
+                           " --vehicle " + source_dir() + "/profiles/foldable_drone.yaml </dev/null";
+  Process piped({"/bin/sh", "-c", line}), typed({"script", "-qec", line, "/dev/null"});
+  EXPECT_EQ(piped.wait(), 2);
+  EXPECT_EQ(typed.wait(), 2);
+  EXPECT_THAT(piped.err(), Not(HasSubstr("from above")));
+  EXPECT_THAT(typed.out(), AllOf(HasSubstr("from above, the nose up"), HasSubstr("###:::#")));
 }
 
 TEST_F(Campaigns, ArePackedWholeWithChecksumsAndTheWordsOfAnArchive) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <map>
 #include <sstream>
 
 #include "commands/commands.hpp"
@@ -60,6 +61,26 @@ TEST(Help, FitsEightyColumns) {
       EXPECT_LE(width, 80) << verb->get_name() << ": " << line;
     }
   }
+}
+
+TEST(Help, StartsWithWhatIsForEveryDayAndHasNoMoreThanTenOptionsUnderAHeading) {
+  CLI::App program("kphi", "kphi");
+  program.formatter(narrow_help());
+  ExitCode exit_code = ExitCode::ok;
+  for (AddVerb* add : kVerbs) add(program, exit_code);
+  for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) {
+    std::map<std::string, int> options;  // by heading
+    for (const CLI::Option* option : verb->get_options())
+      if (!option->get_lnames().empty()) EXPECT_LE(++options[option->get_group()], 10) << verb->get_name();
+    const std::string help = verb->help();
+    EXPECT_LE(options.size() > 1 ? help.find("\nOptions:\n") : 0, help.find("\nDevelopers")) << verb->get_name();
+    EXPECT_EQ(help.find("\n\n\n"), std::string::npos) << help;
+    for (const auto& [heading, count] : options)
+      EXPECT_NE(help.find("\n" + heading + ":\n"), std::string::npos) << verb->get_name() << ": " << heading;
+  }
+  const std::string fit = program.get_subcommand("fit")->help();
+  EXPECT_LT(fit.find("--vehicle"), fit.find("\nEstimators:\n"));
+  EXPECT_GT(fit.find("--estimator"), fit.find("\nEstimators:\n"));
 }
 
 }  // namespace kphi::commands::usage_test

@@ -66,7 +66,8 @@ TEST(CampaignText, TakesEveryLayout) {
   const std::string shipped_order =
       "order:\n  remount_each_repetition: true  # only so does their spread hold what a mounting changes\n";
   const std::string text = replaced(shipped().text, shipped_order, "");
-  const std::string line = "occlusions_deg: [0, 45, 90, 180, 270]  # sector plates; 0 is no plate and gives K_T\n";
+  const std::string line =
+      "occlusions_deg: [0, 45, 90, 180, 270]  # sector plates; 0 is no plate, gives K_T; the report draws them\n";
   const std::string repetitions = "repetitions: 3           # of each\n";
   for (const char* block : {"occlusions_deg:\n  - 0\n  - 45  # small\n  - 90\n", "occlusions_deg:\n- 0\n- 90\n",
                             "occlusions_deg: [ 0,\n   90 ]\n"})

@@ -44,6 +44,14 @@ TEST(VehicleDrawing, HasADiskForEachRotorOfEachShapeAndACoveredPartWherePhiIsAbo
   EXPECT_THAT(occlusions_of(drone, "X"), Each(Radians(0)));
 }
 
+TEST(VehicleDrawing, HasTwoShapesInARowAndWordsThatATelephoneShowsAtTenPixels) {
+  pugi::xml_document document;
+  ASSERT_TRUE(document.load_string(draw_shapes(shipped("foldable_drone.yaml")).c_str()));
+  const double shrunk = 358 / document.child("svg").attribute("width").as_double();
+  for (const auto& words : document.select_nodes("//text"))
+    EXPECT_GE(shrunk * words.node().attribute("font-size").as_double(), 10);
+}
+
 TEST(VehicleDrawing, ClipsEachCoveredPartByADiskOfItsOwn) {
   const std::string svg = draw_shapes(shipped("foldable_drone.yaml"));
   pugi::xml_document document;

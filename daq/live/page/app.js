@@ -6,7 +6,7 @@ const kGap_s = 1;          // no line is drawn across a longer silence
 const kSilent_s = 1;       // without a tick from the runner: it is waiting
 const kMostLines = 500;
 const kNear = 0.9;         // of a limit
-const kAtRest_rpm = 50;    // slower: at rest
+const kAtRest_rpm = 96;    // slower: at rest, as for the drivers: 10 rad/s
 
 const kMostGhost = 20000;  // points of one run
 const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
@@ -56,7 +56,7 @@ const hands = name => {
     dblclick() { state.held[name] = false; state.chartsDue = state.stepsDue = true; } };
 };
 const readOut = (name, words) => ({
-  highlightCallback: (event, x, points) => text(name + '_read', words(x, points.filter(point => point.yval !== null))),
+  highlightCallback: (event, x, points) => text(name + '_read', words(x, points.filter(point => Number.isFinite(point.yval)))),
   unhighlightCallback: () => text(name + '_read', ''),
   zoomCallback: () => { state.held[name] = true; } });
 /// Numbers of an axis that spans this: two digits of it.
@@ -68,21 +68,25 @@ const charts = {};
 
 function makeCharts() {
   for (const chart of Object.values(charts)) chart.destroy();
+  // Before anything was measured: axes as they will be.
   const empty = n => [[0, ...Array(n).fill(null)], [1, ...Array(n).fill(null)]];
+  const rpm = [0, 1.06 * Math.max(state.hello.speed_max_rpm, 100)], minute = [0, 60];
   charts.speed = new Dygraph(at('speed_chart'), empty(2), { ...common('speed'),
     ...readOut('speed', (x, points) => `${fixed(x, 1)} s: ` + points.map(p => `${p.name} ${thousands(p.yval)}`).join(', ')),
     labels: ['t', 'commanded', 'measured'],
     colors: [colour('commanded'), colour('measured')], series: { commanded: { stepPlot: true, strokeWidth: 3 } },
-    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: thousands } } });
+    dateWindow: minute, valueRange: rpm, axes: { y: { axisLabelWidth: 62, axisLabelFormatter: thousands } } });
   charts.thrust = new Dygraph(at('thrust_chart'), empty(2), { ...common('thrust'),
     ...readOut('thrust', (x, points) => { const [, unit, , digits] = kCurves[state.curve];
       return `${fixed(x, 1)} s: ` + points.map(p => `${p.name === 'before' ? 'before ' : ''}${fixed(p.yval, digits)} ${unit}`).join(', '); }),
     labels: ['t', 'before', 'now'], series: { before: { strokePattern: [6, 4], strokeWidth: 1.5 } },
-    colors: [colour('soft'), colour('thrust')], axes: { y: { axisLabelWidth: 62 } } });
+    colors: [colour('soft'), colour('thrust')], dateWindow: minute, valueRange: [0, 2],
+    axes: { y: { axisLabelWidth: 62, axisLabelFormatter: axisOf(2) } } });
   charts.k = new Dygraph(at('k_chart'), empty(1), { ...common('k'),
     ...readOut('k', (x, points) => points.map(p => `φ ${p.name}: ${fixed(p.yval, 4)} at ${thousands(x)} RPM`).join(', ')),
-    labels: ['x', 'k'], strokeWidth: 0, drawPoints: true,
-    pointSize: 5, drawPointCallback: drawStep, axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62 } } });
+    labels: ['x', 'k'], strokeWidth: 0, drawPoints: true, dateWindow: rpm, valueRange: [0, 2],
+    pointSize: 5, drawPointCallback: drawStep,
+    axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62, axisLabelFormatter: axisOf(2) } } });
   state.chartsDue = state.stepsDue = true;
 }
 
@@ -189,10 +193,9 @@ function showNumbers() {
 
 /// Asked before the first run: no reading yet but that of the rest.
 function showFirstQuestion(question) {
-  text('occlusion', fixed(question.occlusion_deg, 0) + '°');
-  text('speed', '0');
-  text('speed_beside', 'at rest');
-  if (!question.has_power) text('supply', 'off');
+  const { occlusion_deg, repetition, run, has_power } = question;
+  for (const [id, words] of Object.entries({ run, repetition, occlusion: fixed(occlusion_deg, 0) + '°', step: 'waiting', step_word: '', speed: '0',
+    speed_beside: 'at rest', thrust_beside: 'not measured now', ...(has_power ? {} : { supply: 'off', module: 'no power' }) })) text(id, String(words));
 }
 
 /// A stale value is a '?' with its age; `none` is the reason why there is no value yet. While a person is asked, the
@@ -201,8 +204,8 @@ function showFigure(id, value, words, age_s, beside, none = '') {
   const silent_s = Math.max(age_s, state.tick.silent_s), asked = state.question !== null && !state.ended;
   const stale = !asked && !none && (value === null || state.tick.silent_s > kSilent_s);
   text(id, state.ended || none ? '–' : asked ? (id === 'speed' ? '0' : '–') : stale ? '?' : words(value));
-  const unseen = id === 'speed' && value > kAtRest_rpm ? ', not seen at rest' : '';
-  text(id + '_beside', state.ended ? `last value ${words(value)}${unseen}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
+  const rest = id !== 'speed' || value === null ? '' : value > kAtRest_rpm ? ', not seen at rest' : ', at rest';
+  text(id + '_beside', state.ended ? `last value ${words(value)}${rest}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
     : none || (stale ? `no reading for ${fixed(silent_s, 1)} s` : beside));
   at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
   at(id).closest('.figure').classList.toggle('over', state.ended);
@@ -223,7 +226,7 @@ function showReadings(tick) {
   text('vibration', Number.isNaN(rms) ? '–' : `${fixed(rms, 2)} N` + (tick.blade_pass_n === null ? ''
     : ` · ${fixed(tick.blade_pass_n, 2)} N at ${fixed(tick.blade_pass_hz, 0)} Hz`));
   text('received', thousands(tick.samples));
-  text('samples_word', tick.runs ? 'Samples of the campaign' : 'Samples');
+  text('samples_word', tick.runs ? 'Samples so far' : 'Samples');
   text('lost', `${thousands(tick.lost_network)}, ${thousands(tick.lost_host)}`);
   at('lost').classList.toggle('bad', tick.lost_network + tick.lost_host > 0);
 }
@@ -241,6 +244,7 @@ function makeLimits(limits) {
     row.children[3].textContent = limit.source;
     return row;
   }));
+  showLimits({ watched: {} });
 }
 
 /// Three digits of the limit.

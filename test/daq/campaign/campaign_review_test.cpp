@@ -1,6 +1,7 @@
 // Whole campaigns on the deterministic bench, each in another order.
 #include "daq/campaign/campaign_review.hpp"
 
+#include "daq/campaign/resume.hpp"
 #include "test/daq/campaign_on_bench.hpp"
 
 namespace kphi::daq {
@@ -153,26 +154,38 @@ TEST_F(OrderedCampaign, RunsAnOutlyingRepetitionAgainAndKeepsIt) {
   expect_whole();
 }
 
-/// What a person reads beside a campaign that takes ten minutes: each time that a number falls back, and no line was
-/// said since the last one.
+/// What a person reads beside a campaign that takes ten minutes: each time that percent, run, step or time left falls
+/// back, and no line said why since the last one.
 class WatchedProgress : public OrderedCampaign {
  protected:
   WatchedProgress() {
     said_.at_tick = [this](const Position& at, const Observation&) {
-      const bool falls = at.done < done_ || at.run < run_ || at.remaining_s > left_s_ + 1e-6;
-      if (falls && said_.lines.size() == lines_)
-        fallen_.push_back(fmt::format("run {}: {:.4f} to {:.4f}, {:.1f} to {:.1f} s left", at.run, done_, at.done,
-                                      left_s_, at.remaining_s));
-      done_ = at.done, run_ = at.run, left_s_ = at.remaining_s, lines_ = said_.lines.size(), ++ticks_;
+      const bool same_run = at.run == last_.run && at.repetition == last_.repetition && !said({"resumed"});
+      if ((std::floor(100 * at.done) < std::floor(100 * last_.done) && !said({"runs in all", "resumed"})) ||
+          (at.run < last_.run) || (same_run && at.step >= 0 && at.step < last_.step) ||
+          (at.remaining_s > last_.remaining_s + 1 && !said({"time left: ", "resumed"})) ||
+          (at.remaining_s > last_.remaining_s + 1e-6 && said_.lines.size() == lines_))
+        fallen_.push_back(fmt::format("run {} step {}: {:.4f} to {:.4f}, step {}, {:.1f} to {:.1f} s left", at.run,
+                                      at.step, last_.done, at.done, last_.step, last_.remaining_s, at.remaining_s));
+      last_ = at, lines_ = said_.lines.size(), ++ticks_;
     };
+    last_.remaining_s = 1e9;
+  }
+  /// Any of these, since the last tick.
+  [[nodiscard]] bool said(const std::vector<std::string>& words) const {
+    return std::any_of(said_.lines.begin() + static_cast<std::ptrdiff_t>(lines_), said_.lines.end(),
+                       [&](const std::string& line) {
+                         return std::ranges::any_of(
+                             words, [&](const std::string& one) { return line.find(one) != std::string::npos; });
+                       });
   }
   void expect_no_fall() const {
     EXPECT_THAT(fallen_, IsEmpty());
     EXPECT_GT(ticks_, 1000);
-    EXPECT_NEAR(done_, 1, 1e-9) << "the end is the end";
+    EXPECT_NEAR(last_.done, 1, 1e-9) << "the end is the end";
   }
-  double done_ = 0, left_s_ = 1e9;
-  int run_ = 0, ticks_ = 0;
+  Position last_;
+  int ticks_ = 0;
   std::size_t lines_ = 0;
   std::vector<std::string> fallen_;
 };
@@ -198,6 +211,24 @@ TEST_F(WatchedProgress, NeverFallsBackWhereStepsEndByThemselves) {
 
 TEST_F(WatchedProgress, NeverFallsBackWithReferenceRuns) {
   EXPECT_EQ(run(campaign("90", 2, "order: {reference: true}\n")).runs, 4);
+  expect_no_fall();
+}
+
+TEST_F(WatchedProgress, NeverFallsBackWhereStepsAreFlagged) {
+  std::ofstream(folder_.path() / "faults.yaml")
+      << "format: kphi-faults/1\nfaults:\n  - {at_s: 2, for_s: 20, kind: loss, p: 0.05, burst: 3}\n";
+  config_ = test::deterministic_config(2, (folder_.path() / "faults.yaml").string());
+  EXPECT_GT(run(campaign("0, 90", 2, "")).steps.flagged, 0u);
+  expect_no_fall();
+}
+
+TEST_F(WatchedProgress, FallsWithAWordWhenACampaignIsResumed) {
+  person_.refuse_at_deg = 90;
+  EXPECT_THROW((void)run(campaign("0, 90", 2, "")), NotMounted);
+  person_.refuse_at_deg = -1;
+  const Resumption resumption = inspect(*results_, false);
+  bench_.emplace(config_);
+  EXPECT_EQ(go(*bench_, *results_, &resumption).runs, 4);
   expect_no_fall();
 }
 
@@ -402,6 +433,12 @@ TEST_F(OrderedCampaign, RunsAnOcclusionAgainWhileThatWouldMoveItsK) {
                                                            "0.5 % is enough: running it again, 3 of at most 4$")));
   EXPECT_THAT(said_.lines, Contains(HasSubstr("not run again: 4 runs are the most")));
   expect_whole();
+}
+
+TEST_F(WatchedProgress, FallsWithAWordWhereTheCampaignAddsRunsWhoseStepsEndByThemselves) {
+  spoil_second_run();
+  EXPECT_EQ(run(until(campaign("0, 90", 2, "").text, "[2, 4]", "0.5")).runs, 8);
+  expect_no_fall();
 }
 
 TEST_F(OrderedCampaign, DoesNotRunAnOcclusionAgainThatIsKnown) {

@@ -53,6 +53,21 @@ TEST(RawSamples, AreAsManyAsWantedAndNoneOutsideTheRun) {
   EXPECT_TRUE(samples_of(late, 100).empty());
 }
 
+TEST(RawSamples, OfAWholeRunAreMeansFromItsBeginningToItsEndWithTheZeroOfTheStep) {
+  results::RunRecording run = recording();
+  run.phases = {{results::Phase::zero_before, -1, 0, 0}};
+  for (int i = 0; i < 200; ++i) run.motor.push_back({MotorChannel::speed, std::int64_t{i} * 20'000'000, 0, -100.0 - i});
+  const Settling whole = whole_run(run, run.load_cell, step()).value();
+  ASSERT_NEAR(static_cast<double>(whole.thrust_n.size()), 800, 2);
+  EXPECT_LT(whole.thrust_n.front().time_s, 0.01);
+  EXPECT_GT(whole.thrust_n.back().time_s, 3.99);
+  const auto at_2_5_s = whole.thrust_n.at(500).value;
+  EXPECT_NEAR(at_2_5_s, 1.75, 0.001);
+  EXPECT_NEAR(whole.thrust_n.back().value - at_2_5_s, 1, 0.001);
+  ASSERT_EQ(whole.speed_rad_s.size(), 200u);
+  EXPECT_NEAR(whole.speed_rad_s.back().value, 299, 1e-9) << "unsigned";
+}
+
 TEST(RawSamples, AreNotShownWhenARunIsMissing) {
   const TemporaryFolder folder;
   const RawSamples raw =

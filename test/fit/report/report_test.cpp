@@ -113,6 +113,8 @@ TEST(Html, NoBytesBreakThePage) {
 TEST(Html, SetsWhatPlainTextWritesInAscii) {
   EXPECT_EQ(typeset("K_T: T = k w^2 at phi = 45 deg, 1e-8 N/RPM^2 <b>"),
             "K<sub>T</sub>: T = k ω² at φ = 45°, 1e-8 N/RPM² &lt;b&gt;");
+  EXPECT_EQ(typeset("measure phi with `kphi fit --u` <b>"), "measure φ with <code>kphi fit --u</code> &lt;b&gt;");
+  EXPECT_EQ(typeset("one ` alone"), "one ` alone");
   EXPECT_EQ(typeset("many degrees of Delphi"), "many degrees of Delphi");
   EXPECT_EQ(typeset("5x3_phi000_rep1.h5 at phi"), "5x3_phi000_rep1.h5 at φ") << "names of files stay as they are";
 }
@@ -235,6 +237,41 @@ TEST_F(Figure, IsTheSameBytesForTheSameSteps) {
   for (std::size_t i = 0; i < first.drawn.size(); ++i)
     EXPECT_EQ(results::read_text(first.drawn[i].svg), results::read_text(second.drawn[i].svg));
   EXPECT_EQ(page(first), page(second));
+}
+
+TEST_F(Figure, OfTheSharesHasOnRequestThePapersValuesAndAnEarlierCampaign) {
+  Fitted ours = analysed(fit);
+  const Fitted earlier = analysed(identify(campaign_steps({1.5e-6, 1.5e-6, -4e-9})));
+  ours.identification.diameter_in = 5;
+  ours.identification.blades = 3;
+  DrawnBeside beside;
+  beside.earlier = &earlier;
+  beside.earlier_words = "monday_phi (simulated, 2021-05-30)";
+  beside.paper = true;
+  const Figures figures = draw_figures(ours, shares_of_steps(fit), folder.path(), "gnuplot", beside);
+  ASSERT_EQ(figures.skipped, "");
+  expect_words(figures.drawn.at(0).caption,
+               {"Grey rings: k of an earlier campaign, monday_phi (simulated, 2021-05-30).",
+                "the paper's values of this propeller, almost 90 % at 45° and 25 % at 270°"});
+  const std::string csv = results::read_text(folder.path() / "thrust_share.csv");
+  expect_words(csv, {"earlier_k_n_s2_per_rad2,0,", "paper_percent,45,90,", "paper_percent,270,25,"});
+  ours.identification.blades = 2;
+  EXPECT_THAT(draw_figures(ours, shares_of_steps(fit), folder.path(), "gnuplot", beside).drawn.at(0).caption,
+              Not(HasSubstr("paper")));
+}
+
+TEST(Report, HasTheStatementsThatOnePropellerCanTestOnRequestAlone) {
+  Fitted ours = analysed(identify(campaign_steps()));
+  ours.identification.diameter_in = 5;
+  ours.identification.blades = 3;
+  Chapter chapter{provenance(), {}};
+  EXPECT_THAT(format_report(ours, chapter), Not(HasSubstr("almost 90 %")));
+  chapter.claims = true;
+  const std::string html = format_report(ours, chapter);
+  (void)parsed(html);
+  expect_words(html, {"The paper's statements", "5-inch 3-blade at 270°: 25 % of its thrust"});
+  EXPECT_THAT(html, Not(HasSubstr("not tested")));
+  EXPECT_THAT(html, HasSubstr("<details class=\"appendix\" open=\"open\">")) << "so that it prints";
 }
 
 TEST_F(Figure, OfABareTableShowsTheLineOnly) {
