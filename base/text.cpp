@@ -69,6 +69,13 @@ std::string_view TextFile::next_block() {
   return bytes_;
 }
 
+std::string TextFile::rest() {
+  bytes_.erase(0, std::exchange(given_, 0));
+  while (read_more() > 0) {
+  }
+  return std::move(bytes_);
+}
+
 std::string read_text_file(const std::filesystem::path& path, std::size_t most_bytes) {
   TextFile file(path, most_bytes);
   std::string text;

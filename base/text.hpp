@@ -54,6 +54,8 @@ class TextFile {
   TextFile(const std::filesystem::path& path, std::size_t most_bytes);
   /// Valid until the next call; empty at the end. The last line may lack its line break.
   [[nodiscard]] std::string_view next_block();
+  /// All that is left, whatever its bytes are.
+  [[nodiscard]] std::string rest();
   /// Bytes, when it was opened.
   [[nodiscard]] std::size_t size() const { return size_; }
 

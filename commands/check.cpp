@@ -21,6 +21,7 @@
 #include "drivers/sim/input_files.hpp"
 #include "fit/coefficients/error_in_flight.hpp"
 #include "fit/export/targets.hpp"
+#include "fit/flights/flight_layout.hpp"
 #include "fit/logs/layout.hpp"
 #include "profiles/answers.hpp"
 #include "profiles/plan.hpp"
@@ -271,6 +272,8 @@ const std::vector<Kind>& kinds() {
            {"k_t_n_per_rpm2", "loss_law"}),
       ours(FileKind::layout, [](Text text, File file) { return fit::describe(fit::parse_layout(text, file.path)); },
            {"header_line"}),
+      ours(FileKind::flight_layout,
+           [](Text text, File file) { return fit::describe(fit::parse_flight_layout(text, file.path)); }, {"series"}),
       {"coefficients", compensation::kCoefficientFormat,
        [](Text, File file) {
          return lines_of(

@@ -9,6 +9,7 @@
 #include "base/csv.hpp"
 #include "base/number.hpp"
 #include "commands/commands.hpp"
+#include "commands/fit_flight.hpp"
 #include "commands/inputs.hpp"
 #include "commands/outputs.hpp"
 #include "compensation/units.hpp"
@@ -131,6 +132,8 @@ struct FitRequest {
   bool json = false;
   std::string vehicle;
   PageRequest page;
+  std::string layout, shape, bench;  ///< of a flight
+  std::optional<double> mass_kg;
 };
 
 /// "A:B" in RPM; either end may be left out.
@@ -189,18 +192,25 @@ Identification identify_input(const FitInput& input, const FitRequest& request) 
   return identify_table(input.table, options);
 }
 
+/// The limits of the verdict as asked for.
+ReadinessLimits limits_of(const FitRequest& request) {
+  ReadinessLimits limits;
+  const auto& percent = request.fly_within_percent;
+  if (!percent) return limits;
+  if (!(*percent > 0 && *percent <= 100))
+    throw ConfigurationError(
+        fmt::format("--fly-within {}: expected a share of the thrust above 0, in percent", *percent));
+  limits.fit_to_fly = *percent / 100;
+  limits.with_care = std::max(limits.with_care, limits.fit_to_fly);
+  return limits;
+}
+
 /// What the campaign's files know of errors; --u overrides it.
 AnalysisOptions analysis_options(const FitRequest& request, const FitInput& input,
                                  const Identification& identification) {
   AnalysisOptions options = commands::analysis_options(input, identification);
   for (const std::string& text : request.uncertainties) set_uncertainty(options.bench, text);
-  if (const auto& percent = request.fly_within_percent) {
-    if (!(*percent > 0 && *percent <= 100))
-      throw ConfigurationError(
-          fmt::format("--fly-within {}: expected a share of the thrust above 0, in percent", *percent));
-    options.limits.fit_to_fly = *percent / 100;
-    options.limits.with_care = std::max(options.limits.with_care, options.limits.fit_to_fly);
-  }
+  options.limits = limits_of(request);
   return options;
 }
 
@@ -315,7 +325,37 @@ ExitCode refused_or_ok(const FitRequest& request, const Fitted& fitted) {
   return ExitCode::data_rejected;
 }
 
+ExitCode run_flight(const FitRequest& request) {
+  const auto refuse = [&](bool given, const char* option) {
+    if (given) throw ConfigurationError(fmt::format("{}: a flight log; {} is for a bench", request.path, option));
+  };
+  const IdentificationOptions& options = request.options;
+  refuse(options.estimator != Estimator::through_origin, "--estimator");
+  refuse(options.weighting != Weighting::equal, "--weights");
+  refuse(options.loss != Loss::none || options.curve.loss != Loss::none, "--loss or --curve-loss");
+  refuse(options.curve.form != CurveForm::line || !options.curve.points_deg.empty(), "--form or --points");
+  refuse(request.at_speed_rpm || !request.speed_range_rpm.empty(), "--at-speed-rpm or --speed-range-rpm");
+  refuse(!request.left_out.empty() || !request.family.empty() || request.raw, "--leave-out, --family or --raw");
+  return fit_flight_log({.path = request.path,
+                         .vehicle = request.vehicle,
+                         .layout = request.layout,
+                         .shape = request.shape,
+                         .out = request.out,
+                         .propeller = options.propeller,
+                         .bench = request.bench,
+                         .blades = options.blades,
+                         .mass_kg = request.mass_kg,
+                         .uncertainties = request.uncertainties,
+                         .limits = limits_of(request),
+                         .no_report = request.no_report,
+                         .accept = request.accept,
+                         .json = request.json});
+}
+
 ExitCode run_fit(const FitRequest& request) {
+  if (is_flight_log(request.path, request.layout)) return run_flight(request);
+  if (request.mass_kg || !request.shape.empty() || !request.bench.empty())
+    throw ConfigurationError(request.path + ": not a flight log; --mass, --shape and --bench are for one");
   FitInput input = load_input(request.path, request.k_unit);
   if (!input.table.empty())
     if (const std::string obstacle = obstacle_to_flight(input.table); !obstacle.empty())
@@ -436,9 +476,13 @@ ExitCode run_report(const ReportRequest& request) {
 void add_fit(CLI::App& program, ExitCode& exit_code) {
   const auto [command, request] = add_verb<FitRequest>(
       program, exit_code, "fit", "fit k to the steps of each occlusion, then the curve k(φ); write a report",
-      "kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml", run_fit);
-  add_argument(command, "INPUT", request.path,
-               "campaign folder, steps.csv, or K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…]")
+      "kphi fit results/<folder>\nkphi fit K.csv --anchored --points 45,90 --out k.yaml\n"
+      "kphi fit flight.ulg --vehicle vehicle.yaml --mass 0.612",
+      run_fit);
+  add_argument(
+      command, "INPUT", request.path,
+      "campaign folder, steps.csv, K.csv with phi_deg and k_n_s2_per_rad2 or k_n_per_rpm2[, u_k_…], or a flight log "
+      "(PX4 ULog, Crazyflie card log, any table with --layout)")
       ->check(kExistingPath);
   add_value(command, "--out", "FILE", request.out, "coefficient file; report and figures go beside it");
   add_value(
@@ -492,6 +536,14 @@ void add_fit(CLI::App& program, ExitCode& exit_code) {
   add_value(command, "--propeller", "ID", request.options.propeller, "id of the propeller (default: from the steps)");
   command.add_option("--diameter-in", request.options.diameter_in, "diameter in inches (default: from the steps)");
   command.add_option("--blades", request.options.blades, "number of blades (default: from the steps)");
+  begin_group(command, "A flight");
+  command.add_option("--mass", request.mass_kg, "the vehicle with its battery, kg (default: the vehicle file's)")
+      ->type_name("KG")
+      ->check(CLI::PositiveNumber);
+  add_value(command, "--layout", "FILE", request.layout, "which series of the log is which channel")
+      ->check(CLI::ExistingFile);
+  add_value(command, "--shape", "NAME", request.shape, "without arm angles: the shape it flew in");
+  add_value(command, "--bench", "RESULT", request.bench, "coefficients to draw beside its own")->check(kExistingPath);
   begin_group(command, "Developers");
   add_value(command, "--family", "PATH", request.family,
             "fit other propellers the same way and check the paper's claims")

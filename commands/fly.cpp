@@ -14,6 +14,7 @@
 #include "fit/report/gnuplot.hpp"
 #include "profiles/vehicle_drawing.hpp"
 #include "profiles/world.hpp"
+#include "results/file_layer.hpp"
 
 namespace kphi::commands {
 namespace {
@@ -84,9 +85,28 @@ AssumedWorld assumed_of(const FlyRequest& request, const flight::Vehicle& vehicl
   return assumed_world(vehicle, {propeller.diameter_in, propeller.blades}, curves);
 }
 
+/// The coefficients of a flight as a world: their K_T, and γ by which the law of loss keeps as much as the flight did
+/// at its widest φ. nullopt: the file is a world file.
+std::optional<Truth> world_of_flight(const FlyRequest& request, Truth truth) {
+  if (!results::read_text(request.world).starts_with("format: kphi-coefficients/")) return std::nullopt;
+  const auto flown = load_sealed_coefficients(request.world, compensation::Need::thrust_coefficient);
+  if (flown.provenance.flight.empty())
+    throw ConfigurationError(request.world +
+                             ": coefficients of a bench; the air of a simulated flight is a world file, or the "
+                             "coefficients of a real one (kphi fit FLIGHT --vehicle V)");
+  truth.thrust_coefficient = flown.curve.thrust_coefficient();
+  if (flown.alone()) return truth;
+  const Radians widest = flown.curve.largest_fitted();
+  truth.gamma = (1 - flown.curve.at(widest) / flown.curve.thrust_coefficient()) /
+                (1 - thrust_share(truth.law, to_degrees(widest)));
+  return truth;
+}
+
 Truth world_of(const FlyRequest& request, const profiles::Vehicle& file, const flight::Vehicle& vehicle,
                const compensation::Rotors<compensation::ThrustCurve>& curves) {
-  if (request.world.empty()) return assumed_of(request, vehicle, curves).truth;
+  const auto assumed = [&] { return assumed_of(request, vehicle, curves).truth; };
+  if (request.world.empty()) return assumed();
+  if (const auto flown = world_of_flight(request, assumed())) return *flown;
   const profiles::World world = profiles::load_world(request.world);
   profiles::require_vehicle(world, file);
   Truth truth = world.truth;
@@ -362,7 +382,8 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
   add_flight_files(command, request.coefficients, request.vehicle);
   add_value(
       command, "--world", "FILE", request.world,
-      "the air and what the vehicle differs by, which the controller never reads (profiles/world_example.yaml; "
+      "the air and what the vehicle differs by, which the controller never reads (profiles/world_example.yaml, or the "
+      "coefficients of a flight log: its K_T and loss; "
       "default: K_T of the file if it is within 30 % of what is published for such a propeller, else that; no error)");
   add_value(command, "--open", "SHAPE", request.open, "shape of the vehicle file to fly for X (default: X)");
   add_value(command, "--folded", "SHAPE", request.folded, "shape to fly for O, such as H or T (default: O)");

@@ -200,6 +200,8 @@ const char* next_move_for(profiles::FileKind kind) {
       return "give it with --world";
     case profiles::FileKind::layout:
       return "give it with --layout";
+    case profiles::FileKind::flight_layout:
+      return "it says how a flight log is written";
   }
   return "";
 }

@@ -9,6 +9,7 @@
 #include "compensation/mixing.hpp"
 #include "compensation/strict_math.hpp"
 #include "compensation/throttle.hpp"
+#include "compensation/thrust_factor.hpp"
 
 #ifdef __GNUC__
 #define KPHI_BY_ITSELF [[gnu::noinline]]
@@ -23,6 +24,7 @@ using namespace kphi::compensation;
 
 static_assert(sizeof(Compensator) <= sizeof(kphi_compensator) && alignof(Compensator) <= alignof(kphi_compensator));
 static_assert(sizeof(Mixer) <= sizeof(kphi_mixer) && alignof(Mixer) <= alignof(kphi_mixer));
+static_assert(sizeof(ThrustFactor) <= sizeof(kphi_factor) && alignof(ThrustFactor) <= alignof(kphi_factor));
 static_assert(KPHI_MAX_CORNERS == ConvexPolygon::kMaxCorners && KPHI_MAX_ROTORS == kMostRotors &&
               KPHI_MAX_KNOTS == kMostKnots);
 static_assert(KPHI_ARM_ANGLE_STALE == static_cast<int>(Flag::arm_angle_stale) &&
@@ -42,6 +44,10 @@ const Compensator& of(const kphi_compensator* c) noexcept {
 }
 Mixer& of(kphi_mixer* m) noexcept { return *std::launder(reinterpret_cast<Mixer*>(m->state)); }
 const Mixer& of(const kphi_mixer* m) noexcept { return *std::launder(reinterpret_cast<const Mixer*>(m->state)); }
+ThrustFactor& of(kphi_factor* f) noexcept { return *std::launder(reinterpret_cast<ThrustFactor*>(f->state)); }
+const ThrustFactor& of(const kphi_factor* f) noexcept {
+  return *std::launder(reinterpret_cast<const ThrustFactor*>(f->state));
+}
 
 template <class T, class From>
 Rotors<T> taken(const From* values, std::size_t count) noexcept {
@@ -346,6 +352,28 @@ int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real
     achieved[3] = mixed.achieved.yaw.value();
   }
   return mixed.concessions.bits();
+}
+
+int kphi_factor_build(kphi_factor* out, kphi_real mass, kphi_real period_s, kphi_real memory_s, kphi_real flown_error) {
+  const auto built = ThrustFactor::build({mass, Seconds(period_s), Seconds(memory_s), flown_error});
+  if (built) new (out->state) ThrustFactor(*built);
+  return built ? 1 : 0;
+}
+
+void kphi_factor_update(kphi_factor* factor, kphi_real specific_force, kphi_real told_n) {
+  of(factor).update(specific_force, Newtons(told_n));
+}
+
+int kphi_factor_estimate(const kphi_factor* factor, kphi_real* value, kphi_real* u) {
+  const ThrustFactor::Estimate estimate = of(factor).estimate();
+  *value = estimate.factor;
+  *u = estimate.u;
+  return (estimate.known ? KPHI_FACTOR_KNOWN : 0) + (estimate.wrong ? KPHI_FACTOR_WRONG : 0);
+}
+
+void kphi_factor_counts(const kphi_factor* factor, unsigned* used, unsigned* left_out) {
+  if (used != nullptr) *used = of(factor).used();
+  if (left_out != nullptr) *left_out = of(factor).left_out();
 }
 
 }  // extern "C"

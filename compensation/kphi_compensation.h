@@ -20,6 +20,7 @@
 typedef float kphi_real;
 #define kphi_compensator_build kphi_compensator_build_float
 #define kphi_mixer_build kphi_mixer_build_float
+#define kphi_factor_build kphi_factor_build_float
 #else
 typedef double kphi_real;
 #endif
@@ -196,6 +197,25 @@ int kphi_mixer_set_layout(kphi_mixer* mixer, const kphi_real (*hubs)[2], const i
 // KPHI_MIX_UNFINISHED: the search ended early), 0 if nothing. `achieved`, the wrench of these thrusts, may be null.
 int kphi_mix(const kphi_mixer* mixer, const kphi_real wrench[4], const kphi_real* smallest_n,
              const kphi_real* largest_n, kphi_real assured_yaw, kphi_real* thrusts_n, kphi_real achieved[4]);
+
+// By which factor the thrust in flight differs from what the flown k tell (thrust_factor.hpp); it changes nothing.
+// Opaque; plain bytes.
+typedef struct kphi_factor {
+  kphi_real state[16];
+} kphi_factor;
+// What kphi_factor_estimate says: there is enough to tell, and the flown k are wrong by more than their +-.
+enum { KPHI_FACTOR_KNOWN = 1, KPHI_FACTOR_WRONG = 2 };
+
+// 1 unless a setting is outside its range: mass [kg] and period [s] > 0, memory at least 100 periods, flown_error, half
+// of the 95 % interval of the flown k, relative, in [0, 1).
+int kphi_factor_build(kphi_factor* out, kphi_real mass, kphi_real period_s, kphi_real memory_s, kphi_real flown_error);
+// Each period, in free flight: the accelerometer's z (up) [m/s^2], and the sum of k_i w_i^2 [N]. What cannot be used is
+// left out.
+void kphi_factor_update(kphi_factor* factor, kphi_real specific_force, kphi_real told_n);
+// The sum of the flags above; thrust flown over thrust told, and its standard uncertainty, HUGE_VAL unless known.
+int kphi_factor_estimate(const kphi_factor* factor, kphi_real* value, kphi_real* u);
+// Samples used and left out; may be null.
+void kphi_factor_counts(const kphi_factor* factor, unsigned* used, unsigned* left_out);
 
 #ifdef __cplusplus
 }

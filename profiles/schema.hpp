@@ -10,7 +10,7 @@
 
 namespace kphi::profiles {
 
-enum class FileKind { campaign, bench, vehicle, answers, world, layout };
+enum class FileKind { campaign, bench, vehicle, answers, world, layout, flight_layout };
 
 struct FileKindInfo {
   FileKind kind;
@@ -18,13 +18,14 @@ struct FileKindInfo {
   const char* format;  ///< value of the key `format`
 };
 
-inline constexpr std::array<FileKindInfo, 6> kFileKinds{{
+inline constexpr std::array<FileKindInfo, 7> kFileKinds{{
     {FileKind::campaign, "campaign", "kphi-campaign/1"},
     {FileKind::bench, "bench", "kphi-bench/1"},
     {FileKind::vehicle, "vehicle", "kphi-vehicle/1"},
     {FileKind::answers, "answers", "kphi-answers/1"},
     {FileKind::world, "world", "kphi-world/1"},
     {FileKind::layout, "layout", "kphi-layout/1"},
+    {FileKind::flight_layout, "flight_layout", "kphi-flight-layout/1"},
 }};
 
 /// "a bench file", "an answers file"

@@ -384,6 +384,7 @@ void read_fit(const Value& map, Coefficients::Fit& into) {
 
 void read_provenance(const Value& map, Coefficients::Provenance& into) {
   into.campaign = map.text_at("campaign");
+  into.flight = map.text_at("flight");
   if (const auto fit = map.find("fit"); fit && fit->node().IsMap()) read_fit(*fit, into.fit);
   for (const Value& run : map.rows("runs", "a run has no keys"))
     into.runs.push_back({run.at("file").text(), run.text_at("sha256")});
@@ -442,6 +443,8 @@ Coefficients parse_coefficients(const std::string& text, const std::string& path
   coefficients.form = curve.at("form").text();
   coefficients.anchored = curve.at("anchored").truth();
   coefficients.parameters = read_parameters(curve, scale);
+  if (coefficients.form == "line")
+    coefficients.covariance = read_covariance(top, {scale, scale, scale * kPerDegreeToPerRad});
   for (const Value& point : curve.list("points_deg")) coefficients.points.push_back(from_degrees(point.number()));
   if (const auto speed = read_range(top.at("valid"), "speed_rpm")) {
     coefficients.slowest_speed = from_rpm(speed->first);

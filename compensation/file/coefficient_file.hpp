@@ -87,6 +87,7 @@ struct Coefficients {
   };
   struct Provenance {
     std::string campaign;
+    std::string flight;  ///< one line on it, of a flight log; empty: a bench
     Fit fit;
     std::vector<Run> runs;
   };
@@ -116,6 +117,7 @@ struct Coefficients {
   std::string form;                               ///< of the curve, as the file names it
   std::optional<Uncertainty> thrust_coefficient;  ///< of K_T
   std::vector<Parameter> parameters;              ///< of the curve
+  std::vector<std::vector<double>> covariance;    ///< of K_T, intercept and slope per rad; empty: unknown, or a table
   std::vector<std::string> not_known;             ///< sources that these uncertainties lack
   std::vector<std::string> assumed;               ///< sources in them that nobody measured
   ThrustError thrust_error;

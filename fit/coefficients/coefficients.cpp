@@ -176,14 +176,17 @@ std::string provenance_block(const Fitted& fitted, const Provenance& provenance)
       "supply_v: {}\n"
       "provenance:\n"
       "  campaign: {}\n"
-      "  fit: {{model: \"T = k w^2\", estimator: {}, {}}}\n",
+      "  fit: {{model: {}, estimator: {}, {}}}\n",
       air ? yaml_number(air->value) : "unknown", air ? yaml_number(air->u) : "unknown", standard_block(fitted.analysis),
       number(provenance.supply_v.value_or(kUnknown)), quoted(provenance.campaign),
-      quoted(estimator_words(identification)), fit_options(identification, provenance.bench));
+      quoted(provenance.flight.empty() ? "T = k w^2" : "m f = sum of k(phi) w^2 - drag"),
+      quoted(provenance.flight.empty() ? estimator_words(identification) : "least squares over a flight"),
+      fit_options(identification, provenance.bench));
   if (const auto& clock = provenance.clock) {
     text += clock->u_gain ? fmt::format("  motor_clock: {{gain: {}, u: {}}}\n", clock->gain, *clock->u_gain)
                           : "  motor_clock: unchecked\n";
   }
+  if (!provenance.flight.empty()) text += fmt::format("  flight: {}\n", quoted(provenance.flight));
   if (!provenance.cell_weighed.empty()) text += fmt::format("  cell_weighed: {}\n", quoted(provenance.cell_weighed));
   if (provenance.runs.empty()) return text + "  runs: []\n";
   text += "  runs:\n";

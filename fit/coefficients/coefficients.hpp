@@ -51,6 +51,7 @@ struct Provenance {
   std::string cell_weighed{};  ///< one line: when, with what, and what it said of the load cell; empty: it was not
   std::optional<BenchUncertainty> bench{};                          ///< of the budget
   std::vector<compensation::Coefficients::ThrottleLaw> throttle{};  ///< of an imported log with a throttle
+  std::string flight{};                  ///< one line on the flight that was fitted; empty: it was a bench
   std::string stand{}, operator_name{};  ///< of a campaign: names of bench file and person; empty: unknown
 };
 

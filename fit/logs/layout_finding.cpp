@@ -17,8 +17,6 @@
 namespace kphi::fit {
 namespace {
 
-constexpr std::size_t kLinesLooked = 500;  // a preamble is shorter
-
 using SampleRows = std::vector<std::pair<std::size_t, std::vector<std::string>>>;  ///< line and fields
 
 SampleRows rows_of(std::string_view text, const Layout& layout) {
@@ -105,9 +103,7 @@ std::string throttle_unit(const SampleRows& rows, const LayoutColumn& column, co
 
 }  // namespace
 
-Layout find_layout(std::string_view begin, const std::string& path, const LayoutHints& hints) {
-  const std::vector<TextLine> lines = lines_of(begin, kLinesLooked);
-  const TableShape shape = find_shape(lines, path, hints.separator);
+Layout layout_of(const TableShape& shape, const std::vector<TextLine>& lines) {
   Layout layout;
   layout.separator = shape.separator;
   layout.fields = shape.fields;
@@ -118,6 +114,13 @@ Layout find_layout(std::string_view begin, const std::string& path, const Layout
   layout.first_row = above > 0 ? above + 1 : lines[shape.first].number;
   for (const TextLine& line : lines)
     if (layout.comment.empty() && line.number != layout.units_line) layout.comment = line.comment;
+  return layout;
+}
+
+Layout find_layout(std::string_view begin, const std::string& path, const LayoutHints& hints) {
+  const std::vector<TextLine> lines = lines_of(begin, kLinesLooked);
+  const TableShape shape = find_shape(lines, path, hints.separator);
+  Layout layout = layout_of(shape, lines);
   find_roles(path, lines, shape, hints.columns, layout);
   const SampleRows rows = rows_of(begin, layout);
   layout.numbers = marks_of(path, rows, layout, hints);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fit/logs/layout.hpp"
+#include "fit/logs/table_shape.hpp"
 
 namespace kphi::fit {
 
@@ -21,5 +22,10 @@ struct LayoutHints {
 /// `begin`: its first lines, UTF-8. Throws ConfigurationError (path:line) that says what could not be found or could be
 /// read in two ways, with what either would mean, and how to say which.
 [[nodiscard]] Layout find_layout(std::string_view begin, const std::string& path, const LayoutHints& hints = {});
+
+/// What the shape alone says: lines, separator, names, comments.
+[[nodiscard]] Layout layout_of(const TableShape& shape, const std::vector<TextLine>& lines);
+
+inline constexpr std::size_t kLinesLooked = 500;  ///< of the begin; a preamble is shorter
 
 }  // namespace kphi::fit

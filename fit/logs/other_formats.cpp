@@ -38,7 +38,9 @@ constexpr Magic kMagics[]{
     {"SQLite format 3", "an SQLite database; write its table as CSV (sqlite3 -csv) and import that"},
     {"%PDF", "a PDF; export the table from the program that made it as CSV"},
     {"H Product:Blackbox",
-     "a blackbox log of Betaflight, which has no measured thrust; kphi imports tables of a stand"}};
+     "a blackbox log of Betaflight; a flight is read from what `blackbox_decode` makes of it, and kphi import takes "
+     "tables "
+     "of a stand"}};
 
 }  // namespace
 

@@ -60,7 +60,65 @@ ComparedResult result_of(const compensation::Coefficients& file, const std::stri
   }
   for (const auto& row : file.torque)
     add(torque_name(to_degrees(row.occlusion)), kTorqueUnit, row.k_q, row.uncertainty, false);
+  result.file = file;
   return result;
+}
+
+bool is_flight(const ComparedResult& result) { return result.file && !result.file->provenance.flight.empty(); }
+
+/// k(φ)/K_T of a file's curve. Of a line by its covariance, in which common errors cancel; of a table as if they did
+/// not.
+ComparedValue ratio_at(const compensation::Coefficients& file, double phi_deg) {
+  const double k_t = file.curve.thrust_coefficient().value(), phi = from_degrees(phi_deg).value();
+  ComparedValue ratio{fmt::format("{}/K_T", coefficient_name(phi_deg)), "1", file.curve.at(Radians(phi)).value() / k_t};
+  for (const auto& parameter : file.parameters)
+    if (parameter.uncertainty) ratio.freedom = std::min(ratio.freedom, parameter.uncertainty->freedom);
+  if (file.covariance.empty()) {
+    const double u = file.curve.relative_uncertainty(Radians(phi), Radians(0));
+    ratio.standard_error = std::isfinite(u) ? u * ratio.value : 0;
+    return ratio;
+  }
+  const std::array<double, 3> slopes{-ratio.value / k_t, 1 / k_t, phi / k_t};
+  double variance = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j) variance += slopes[i] * slopes[j] * file.covariance[i][j];
+  ratio.standard_error = std::sqrt(std::max(0.0, variance));
+  return ratio;
+}
+
+/// Of a bench and a flight what both can tell; the ratio is judged where it is widest, and shown on the way there.
+void at_common_angles(ComparedResult& a, ComparedResult& b) {
+  if (is_flight(a) == is_flight(b) || !a.file || !b.file) return;
+  const bool curves = !a.file->alone() && !b.file->alone();
+  const double widest =
+      curves ? to_degrees(std::min(a.file->curve.largest_fitted(), b.file->curve.largest_fitted())) : 0;
+  for (ComparedResult* one : {&a, &b}) {
+    one->estimates.resize(1);
+    for (double phi = 15; phi < widest - 5; phi += 15) {
+      one->estimates.push_back(ratio_at(*one->file, phi));
+      one->estimates.back().judged = false;
+    }
+    if (widest > 0) one->estimates.push_back(ratio_at(*one->file, widest));
+  }
+}
+
+/// What a difference between a bench and a flight usually means.
+void remark_flight(Comparison& comparison) {
+  if (is_flight(comparison.a) == is_flight(comparison.b) || comparison.verdict != Agreement::differ) return;
+  bool level = false, ratio = false;
+  for (const Difference& entry : comparison.differences) {
+    if (!entry.significant || !entry.judged) continue;
+    (entry.name == "K_T" ? level : ratio) = true;
+  }
+  if (ratio)
+    comparison.remarks.emplace_back(
+        "k(φ)/K_T differs, in which mass, accelerometer and load cell cancel: in flight the body is no plate on a "
+        "stand "
+        "(the air below it is not the bench's); else an arm is not where its angle says, or k(φ) is no line");
+  if (level && !ratio)
+    comparison.remarks.emplace_back(
+        "K_T differs and k(φ)/K_T does not: one factor in all k; weigh the vehicle with its battery, turn the "
+        "accelerometer over for its scale, look at pole count and clock of the speeds, and weigh the load cell");
 }
 
 Difference difference(const ComparedValue& a, const ComparedValue& b) {
@@ -143,6 +201,7 @@ void remark_common_factor(Comparison& comparison) {
 void to_standard_air(ComparedResult& result) {
   const double scale = kStandardDensity / result.air->value;
   for (ComparedValue& one : result.estimates) {
+    if (one.unit == "1") continue;
     const double of_density = one.value * scale * result.air->u / result.air->value;
     one.value *= scale;
     one.standard_error *= scale;
@@ -211,6 +270,7 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   Comparison comparison;
   comparison.a = std::move(a);
   comparison.b = std::move(b);
+  at_common_angles(comparison.a, comparison.b);
   if (comparison.a.air && comparison.b.air)
     for (ComparedResult* one : {&comparison.a, &comparison.b}) to_standard_air(*one);
   for (const ComparedValue& of_a : comparison.a.estimates) {
@@ -229,6 +289,7 @@ Comparison compare(ComparedResult a, ComparedResult b) {
   remark(comparison);
   remark_missing(comparison);
   remark_common_factor(comparison);
+  remark_flight(comparison);
   return comparison;
 }
 

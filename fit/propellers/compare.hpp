@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "compensation/file/coefficient_file.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/uncertainty/analysis.hpp"
 
@@ -31,6 +32,7 @@ struct ComparedResult {
   double speed_min_rad_s = 0, speed_max_rad_s = 0;
   std::optional<Estimate> air;  ///< density, kg/m³
   std::vector<ComparedValue> estimates;
+  std::optional<compensation::Coefficients> file{};  ///< of a coefficients.yaml
 };
 
 /// A coefficients.yaml, or a folder with one. Standard uncertainties are those of the file, by the GUM. Throws
@@ -67,7 +69,9 @@ struct Comparison {
   std::optional<double> diameter_ratio4;
 };
 
-/// In standard air if both know their density. Undecided unless a judged quantity has both errors.
+/// In standard air if both know their density. Of a bench and a flight, whose φ are not the same: K_T, and k(φ)/K_T of
+/// both curves at the widest φ of the flight, in which mass, accelerometer and load cell cancel. Undecided unless a
+/// judged quantity has both errors.
 [[nodiscard]] Comparison compare(ComparedResult a, ComparedResult b);
 
 /// K_T of several logs beside each other.

@@ -20,8 +20,10 @@ std::vector<double> unit_vector(std::size_t n, std::size_t i) {
 std::string name_of_k(double phi_deg) { return phi_deg == 0 ? "K_T" : fmt::format("k({} deg)", phi_deg); }
 
 ErrorSources sources_of(const Identification& identification, std::span<const SpeedDependence> speed,
-                        const BenchUncertainty& bench) {
-  if (!identification.repeatability.angles.empty()) return error_sources(identification.repeatability, speed, bench);
+                        const AnalysisOptions& options) {
+  if (options.sources) return *options.sources;
+  if (!identification.repeatability.angles.empty())
+    return error_sources(identification.repeatability, speed, options.bench);
   std::vector<double> k, errors;
   for (const OcclusionCoefficient& row : identification.table) {
     k.push_back(row.k);
@@ -284,7 +286,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   const bool from_steps = !identification.repeatability.angles.empty();
   if (from_steps) analysis.speed = speed_dependence(identification.table, identification.repeatability.zero_movement);
   analysis.trend = speed_trend(identification, analysis.speed);
-  const ErrorSources sources = sources_of(identification, analysis.speed, options.bench);
+  const ErrorSources sources = sources_of(identification, analysis.speed, options);
   for (std::size_t i = 0; i < phis.size(); ++i)
     analysis.coefficients.push_back(
         sources.budget(name_of_k(phis[i]), kUnitOfK, identification.table[i].k, unit_vector(phis.size(), i)));
@@ -297,7 +299,7 @@ Analysis analyse(const Identification& identification, const AnalysisOptions& op
   analysis.flight =
       flight_readiness(identification,
                        {analysis.speed, analysis.curvature, analysis.outlying, analysis.differences, analysis.trend,
-                        sources_of(identification, {}, options.bench), options.bench.air_density},
+                        sources_of(identification, {}, options), options.bench.air_density},
                        options.limits);
   analysis.remarks = remarks_of(identification, analysis);
   analysis.rejected = rejected_points(identification);

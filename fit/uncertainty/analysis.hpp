@@ -19,6 +19,7 @@ namespace kphi::fit {
 struct AnalysisOptions {
   BenchUncertainty bench;
   ReadinessLimits limits;
+  std::optional<ErrorSources> sources{};  ///< of a flight: instead of those of bench and steps
   std::vector<double> prediction_deg{0, 15, 30, 45, 60, 75, 90, 120, 135, 150, 180, 210, 240, 270};
 };
 

@@ -372,7 +372,7 @@ try {
     assert.ok(asked.length >= 6);
     assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
   });
-  console.log(`${results.length} of 14 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
+  console.log(`${results.length} of 15 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
 } finally {
   await browser?.close();
   for (const each of [bench, other, unpowered]) each?.clear();

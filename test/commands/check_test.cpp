@@ -49,6 +49,14 @@ TEST_F(Check, TellsTheKindsApart) {
   for (const auto& file : files) EXPECT_EQ(file["ok"], true);
 }
 
+TEST_F(Check, SumsUpAFlightLayout) {
+  const std::string path = write("arms.yaml",
+                                 "format: kphi-flight-layout/1\nseries:\n  - {channel: arm_angle, number: 2, series: "
+                                 "'actuator_servos.control[1]', unit: rad, factor: 0.5}\n");
+  EXPECT_EQ(say("check " + path).out,
+            path + ": valid flight_layout\n  arm_angle 2            \"actuator_servos.control[1]\" · 0.5\n");
+}
+
 TEST_F(Check, SumsUpACampaign) {
   const std::string path = shipped("icra2021_5in_3blade.yaml");
   EXPECT_THAT(say("check " + path).out,

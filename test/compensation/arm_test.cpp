@@ -33,10 +33,12 @@ TEST_P(OnArm, CallsTakeAsManyInstructionsStackAndMemoryAsPromised) {
     EXPECT_GT(counts["longest_search"], 5'000);
     EXPECT_LE(counts["longest_search"], build.longest_search);
     EXPECT_LE(counts["longest_search_curved"], build.longest_search);
+    EXPECT_GT(counts["factor_update"], 20);
+    EXPECT_LE(counts["factor_update"] + counts["factor_estimate"], 300) << "one step of the online estimate";
     ASSERT_EQ(counts["stacks_are_of_what_flies"], 1);
     for (const auto& [name, count] : counts) {
       if (name.rfind("stack_", 0) != 0) continue;
-      EXPECT_GT(count, 50) << name;
+      EXPECT_GE(count, 16) << name;
       EXPECT_LE(count, kStack) << name;
     }
     EXPECT_LE(counts["bytes_compensator"], kCompensatorBytes);

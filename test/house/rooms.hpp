@@ -74,13 +74,14 @@ inline const std::vector<Room>& rooms() {
       {"fit/model", {"base", "compensation", "results", "fit"}},
       {"fit/signal", {"base", "compensation", "results", "fit"}},
       {"fit/uncertainty", {"base", "compensation", "results", "fit"}},
+      // A layout file is a profile as others are.
+      {"fit/logs", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
+      {"fit/flights", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
       {"fit/propellers", {"base", "compensation", "results", "fit"}},
       // Of a campaign that was not run yet: the only room of the fit that sees one.
       {"fit/plan", {"base", "compensation", "profiles", "results", "fit"}},
       {"fit/coefficients", {"base", "compensation", "profiles/vehicle.hpp", "results", "fit"}},
       {"fit/report", {"base", "compensation", "results", "fit"}},
-      // A layout file is a profile as others are.
-      {"fit/logs", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
       {"fit/export", {"base", "compensation", "profiles/vehicle.hpp", "results", "fit"}},
 
       // Drivers that are not kphi's own: what anybody's would see.

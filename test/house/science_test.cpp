@@ -51,7 +51,7 @@ std::set<int> named(std::string text) {
 std::vector<std::pair<fs::path, std::string>> units() {
   std::vector<std::pair<fs::path, std::string>> found;
   for (const char* folder : {"results/reduction", "fit/model", "fit/numerics", "fit/uncertainty", "fit/plan",
-                             "fit/propellers", "fit/signal", "profiles"}) {
+                             "fit/propellers", "fit/signal", "fit/flights", "profiles"}) {
     std::map<fs::path, std::string> here;
     for (const auto& entry : fs::directory_iterator(kRoot / folder))
       if (entry.path().extension() == ".hpp" || entry.path().extension() == ".cpp")

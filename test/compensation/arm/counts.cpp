@@ -7,6 +7,7 @@
 #include "compensation/compensator.hpp"
 #include "compensation/kphi_compensation.h"
 #include "compensation/mixing.hpp"
+#include "compensation/thrust_factor.hpp"
 #include "test/compensation/arm/demands.hpp"
 
 extern "C" void print(const char* text);
@@ -142,9 +143,25 @@ void measure_stacks() {
   int conceded = 0;
   measure_stack("stack_mix",
                 [&] { conceded = kphi_mix(&mixer, kWrench, smallest, largest, kphi_real(0.02), got, achieved); });
+  static kphi_factor factor;
+  kphi_real estimated = 0, u = 0;
+  flown &= kphi_factor_build(&factor, kphi_real(0.5), kphi_real(0.004), 10, kphi_real(0.03));
+  measure_stack("stack_factor_update", [&] { kphi_factor_update(&factor, kphi_real(9.9), kphi_real(4.9)); });
+  measure_stack("stack_factor_estimate", [&] { kphi_factor_estimate(&factor, &estimated, &u); });
   tell("stacks_are_of_what_flies", refused == 0 && flown == 1 && conceded != 0 ? 1 : 0);
   tell("bytes_compensator", sizeof(kphi_compensator));
   tell("bytes_mixer", sizeof(kphi_mixer));
+}
+#endif
+
+#if DEMANDS > 0
+void count_factor() {
+  auto factor = *ThrustFactor::build({Real(0.5), Seconds(Real(0.004)), Seconds(10), Real(0.03)});
+  for (int i = 0; i < 1000; ++i) factor.update(Real(i % 7 - 3) / 10 + Real(9.8), Newtons(Real(4.9)));
+  if (!factor.estimate().known) return;
+  count("factor_update", [&](int i) { factor.update(Real(9.8) + Real(i & 1), Newtons(Real(4.9))); });
+  count("factor_left_out", [&](int) { factor.update(-1, Newtons(Real(4.9))); });
+  count("factor_estimate", [&](int) { sink = factor.estimate().u; });
 }
 #endif
 
@@ -193,6 +210,7 @@ int main() {
   count_searches("longest_search", false);
   count_searches("longest_search_curved", true);
   measure_stacks();
+  count_factor();
 #endif
   return 0;
 }
