@@ -111,7 +111,7 @@ class Fitting {
     const Excitation& done = flown.excitation;
     if (done.widest_deg > kLeastFold && done.folds > 0 && done.seconds_folded > 2 &&
         done.seconds - done.seconds_folded > 2)
-      fit_.wide_deg = done.widest_deg;
+      fit_.wide_deg = std::round(10 * done.widest_deg) / 10;  // as files and people name it
   }
 
   FlightFit fit() {
