@@ -54,7 +54,7 @@ TEST_F(Check, SumsUpAFlightLayout) {
                                  "format: kphi-flight-layout/1\nseries:\n  - {channel: arm_angle, number: 2, series: "
                                  "'actuator_servos.control[1]', unit: rad, factor: 0.5}\n");
   EXPECT_EQ(say("check " + path).out,
-            path + ": valid flight_layout\n  arm_angle 2            \"actuator_servos.control[1]\" · 0.5\n");
+            path + ": valid flight_layout\n  arm_angle 2           \"actuator_servos.control[1]\" · 0.5\n");
 }
 
 TEST_F(Check, SumsUpACampaign) {
