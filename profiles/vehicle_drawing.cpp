@@ -197,10 +197,12 @@ std::string draw_shapes(const Vehicle& vehicle) {
   const Frame frame = frame_of(vehicle);
   const auto shapes = shapes_of(vehicle);
   std::string drawn;
-  for (std::size_t i = 0; i < shapes.size(); ++i)
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const std::size_t row = i / 2;
     drawn += fmt::format("<g transform=\"translate({:g},{:g})\">\n{}</g>\n", kSide * (static_cast<double>(i % 2) + 0.5),
-                         kRow * static_cast<double>(i / 2) + kNose + 0.5 * kSide,
+                         kRow * static_cast<double>(row) + kNose + 0.5 * kSide,
                          ShapePicture(vehicle, frame, shapes[i], i).drawn());
+  }
   const std::string title =
       "The vehicle from above in its shapes: body, arms, disks dashed, what the body covers of them";
   return fmt::format(

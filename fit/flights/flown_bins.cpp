@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <ranges>
 
 #include "base/error.hpp"
 #include "base/statistics.hpp"
@@ -308,8 +307,8 @@ class Cutter {
   void leave_out_ends(const std::vector<FlownBin>& bins, std::vector<char>& usable, const std::vector<char>& flies) {
     if (flown_.height_logged) return;
     const auto first = std::ranges::find(flies, 1) - flies.begin();
-    const auto last = static_cast<std::ptrdiff_t>(flies.size()) - 1 -
-                      (std::ranges::find(std::views::reverse(flies), 1) - std::views::reverse(flies).begin());
+    const auto last =
+        static_cast<std::ptrdiff_t>(flies.size()) - 1 - (std::find(flies.rbegin(), flies.rend(), 1) - flies.rbegin());
     const auto ends = static_cast<std::ptrdiff_t>(4 / flown_.width_s);
     for (std::ptrdiff_t b = 0; b < static_cast<std::ptrdiff_t>(bins.size()); ++b) {
       if (b > first + ends && b < last - ends) continue;

@@ -111,7 +111,8 @@ Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) 
       now = 0.5 * (now + next);
       return moved;
     };
-    moves = halfway(fit.share, next_share) | halfway(fit.zero, next_zero);
+    const bool share_moves = halfway(fit.share, next_share), zero_moves = halfway(fit.zero, next_zero);
+    moves = share_moves || zero_moves;
   }
   return fit;
 }
