@@ -81,12 +81,13 @@ struct Fit {
 /// By Fisher's scoring: least squares of the variances, each weighed by what the last round makes of it, none below 0.
 Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) {
   constexpr int kMostRounds = 400;
-  constexpr double kConverged = 1e-13;
+  constexpr double kConverged = 1e-12;  // of all that scatters
   Fit fit;
   for (const Sample& one : samples) {
     if (with_share && one.of_share > 0) fit.share = std::max(fit.share, one.squares / one.freedom);
     if (with_zero && one.of_zero > 0) fit.zero = std::max(fit.zero, one.squares / one.freedom / one.of_zero);
   }
+  const double least_share = kConverged * fit.share, least_zero = kConverged * fit.zero;
   bool moves = true;
   for (int round = 0; moves && round < kMostRounds; ++round) {
     fit.inform(samples);
@@ -106,13 +107,9 @@ Fit fit_of(const std::vector<Sample>& samples, bool with_share, bool with_zero) 
       if (next_share < 0) next_share = 0, next_zero = zero / fit.of_zero;
       next_zero = std::max(0.0, next_zero);
     }
-    const auto halfway = [](double& now, double next) {
-      const bool moved = std::abs(next - now) > kConverged * now;
-      now = 0.5 * (now + next);
-      return moved;
-    };
-    const bool share_moves = halfway(fit.share, next_share), zero_moves = halfway(fit.zero, next_zero);
-    moves = share_moves || zero_moves;
+    moves = std::abs(next_share - fit.share) > least_share || std::abs(next_zero - fit.zero) > least_zero;
+    fit.share = 0.5 * (fit.share + next_share);
+    fit.zero = 0.5 * (fit.zero + next_zero);
   }
   return fit;
 }
