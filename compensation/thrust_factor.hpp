@@ -1,5 +1,5 @@
 // In flight: by which factor the thrust differs from what the flown k tell, with its uncertainty. Watches and says;
-// changes nothing (docs/science.md, eq. thrust factor).
+// changes nothing (science.md, eq. 41 and 42).
 //
 // Real-time: no call allocates, throws, locks or loops. Not synchronised: call from one thread, or copy it (trivially
 // copyable).
@@ -37,7 +37,7 @@ class ThrustFactor {
     bool known = false;  ///< of the noise there are enough samples that are independent
     bool wrong = false;  ///< known, and |factor − 1| exceeds flown_error by more than kSure u
   };
-  /// By the samples of the last memory; a factor that was known is no longer once samples stay away for long.
+  /// Older samples count less and less, by the memory. After a long time without samples the factor is unknown again.
   [[nodiscard]] Estimate estimate() const noexcept;
   [[nodiscard]] std::uint32_t used() const noexcept { return used_; }  ///< samples; stays at its largest
   [[nodiscard]] std::uint32_t left_out() const noexcept { return left_out_; }

@@ -129,7 +129,7 @@ class CardLogReader {
                               "copy the log from the card again"});
   }
 
-  /// False: what comes is no record.
+  /// False: the next bytes are not a record.
   bool read_record() {
     std::string_view rest = rest_.substr(0, rest_.size() - kCrcBytes);
     const auto id = take_raw<std::uint16_t>(rest);

@@ -219,7 +219,7 @@ class Cutter {
       throw FitError("speeds or commands of the rotors have gaps throughout; no piece of flight is left");
     const double usual = median(all);
     if (!(usual > 0)) throw FitError("the rotors stand still for most of the log; nothing flew");
-    // A log that begins in the air has its height over ground, as far as anybody knows.
+    // A log that begins in the air does not show where the ground is: its height is taken to be over ground.
     std::vector<double> lying;
     for (std::size_t b = 0; b < count && flown_.height_logged; ++b) {
       const double at = height.at(begin_ + (static_cast<double>(b) + 0.5) * width, 1);
@@ -280,7 +280,7 @@ class Cutter {
         bin.turns = bin.turns && std::isfinite(bin.turning[axis]);
       }
       if (bin.turns && rates_known && known(log_.angular_rate[2])) {
-        // What a turning body turns by itself is no moment of the rotors: −ω × J ω.
+        // A rotating body also accelerates by −ω × J ω, without any moment from the rotors.
         const double p = rates[0].mean(from, to, gap), q = rates[1].mean(from, to, gap);
         const double r = yaw.mean(from, to, gap), z = bin.inertia[0] + bin.inertia[1];  // flat, nearly
         bin.turning[0] += q * r * (z - bin.inertia[1]) / bin.inertia[0];
@@ -376,7 +376,7 @@ class Cutter {
     }
   }
 
-  /// Of means over half a second: what shakes is no excitation.
+  /// Range of the means over half a second, so that vibration does not count as excitation.
   [[nodiscard]] double collective_range(const std::vector<double>& forces) const {
     const auto wide = static_cast<std::size_t>(std::max(1.0, 0.5 / flown_.width_s));
     std::vector<double> means;

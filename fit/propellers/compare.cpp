@@ -112,9 +112,9 @@ void remark_flight(Comparison& comparison) {
   }
   if (ratio)
     comparison.remarks.emplace_back(
-        "k(φ)/K_T differs, in which mass, accelerometer and load cell cancel: in flight the body is no plate on a "
-        "stand "
-        "(the air below it is not the bench's); else an arm is not where its angle says, or k(φ) is no line");
+        "k(φ)/K_T differs, although mass, accelerometer and load cell cancel in it: the body of the vehicle disturbs "
+        "the "
+        "air below it differently from a plate on the stand, an arm angle is wrong, or k(φ) is not a line");
   if (level && !ratio)
     comparison.remarks.emplace_back(
         "K_T differs and k(φ)/K_T does not: one factor in all k; weigh the vehicle with its battery, turn the "
