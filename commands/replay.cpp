@@ -44,7 +44,7 @@ struct Replay {
   std::optional<std::string> difference;        ///< of that table, or of another one of the campaign
 };
 
-/// Steps in the order of the files; a thread per processor. Throws DataRejected for a run that was changed.
+/// Steps in the order of the files. Throws DataRejected for a run that was changed.
 std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
   std::vector<std::packaged_task<std::vector<StepMean>(results::LoadCellColumns&)>> tasks;
   std::map<std::string, results::RunDigests> digests;
@@ -57,8 +57,8 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
     results::LoadCellColumns cell;
     for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task](cell);
   };
-  std::vector<std::jthread> others;
-  for (std::size_t i = 1; i < std::min<std::size_t>(std::thread::hardware_concurrency(), tasks.size()); ++i)
+  std::vector<std::jthread> others;  // two in all for a processor: none is idle during the last run
+  for (std::size_t i = 1; i < std::min<std::size_t>(2 * std::thread::hardware_concurrency(), tasks.size()); ++i)
     others.emplace_back(work);
   work();
   std::vector<StepMean> steps;

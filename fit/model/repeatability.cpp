@@ -20,8 +20,10 @@ double shape(const ThrustFit& fit, double k, std::size_t i) {
 
 /// Residuals of one step index over the runs that have it.
 struct LevelResiduals {
-  double wx = 0, count = 0, sum = 0, squares = 0, in_offset = 0;
+  double wx = 0, count = 0, sum = 0, squares = 0, in_offset = 0, leverage = 0;
 };
+
+constexpr double kLeastLeft = 0.1;  // of a step's variance in its residual: a line takes nearly all of a third step
 
 double count(const AngleScatter& angle) { return static_cast<double>(angle.runs.size()); }
 
@@ -98,6 +100,7 @@ WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const T
     LevelResiduals& level = levels[steps[i].step];
     level.wx += w * x;
     if (lines) level.in_offset += run.in_offset(w, x);
+    level.leverage += lines ? run.leverage(w, x) : w * x * x / run.xx;
     level.sum += residual;
     level.squares += residual * residual;
     ++level.count;
@@ -106,20 +109,18 @@ WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const T
   double sum = 0, square_sum = 0, counted = 0;
   for (const auto& [index, level] : levels) {
     if (repeated && level.count < 2) continue;
-    const double variance =
-        repeated ? (level.squares - level.sum * level.sum / level.count) / (level.count - 1) : level.squares;
-    const double part = std::pow(level.wx / level.count, 2) * variance;
-    const double freedom = repeated ? level.count - 1 : 1;
-    sum += part;
-    square_sum += std::pow(std::pow(level.wx / level.count, 2), 2) / freedom;
-    counted += std::pow(level.wx / level.count, 2);
-    result.offset_variance += std::pow(level.in_offset / level.count, 2) * variance;
+    const double squares = repeated ? level.squares - level.sum * level.sum / level.count : level.squares;
+    const double freedom = repeated ? level.count - 1 : 1, weight = square(level.wx / level.count);
+    const double variance = squares / freedom / std::max(kLeastLeft, 1 - level.leverage / level.count);
+    sum += weight * variance;
+    square_sum += square(weight) / freedom;
+    counted += weight;
+    result.offset_variance += square(level.in_offset / level.count) * variance;
   }
   const double n = static_cast<double>(levels.size()), fitted = lines ? 2 : 1;  // for each run
   if (!(counted > 0) || n < 2) return {};
-  result.variance = sum / (xx * xx) * n / (n - fitted);
+  result.variance = sum / (xx * xx);
   result.freedom = counted * counted / square_sum * (n - fitted) / n;
-  result.offset_variance *= n / (n - fitted);
   return result;
 }
 

@@ -36,6 +36,10 @@ struct RunSums {
   [[nodiscard]] double slope() const { return (w * xt - x * t) / determinant(); }    ///< of that
   /// Change of offset() for 1 N of a step.
   [[nodiscard]] double in_offset(double w1, double x1) const { return w1 * (xx - x * x1) / determinant(); }
+  /// Share of a step's own error that its line follows.
+  [[nodiscard]] double leverage(double w1, double x1) const {
+    return in_offset(w1, x1) + w1 * x1 * (w * x1 - x) / determinant();
+  }
   [[nodiscard]] double determinant() const { return w * xx - x * x; }
 };
 
@@ -52,8 +56,7 @@ struct WithinRuns {
                                                 const ThrustFit& fit, double k, const results::ZeroMovement& movement);
 
 /// science.md, eq. 13. From the interaction of step and repetition, which contains neither errors of whole runs, in
-/// proportion or in newtons, nor of the map; from the residuals of a single run. Each step counts by its own scatter
-/// (MacKinnon, White 1985), since thrust scatters more where it is high.
+/// proportion or in newtons, nor of the map; from the residuals of a single run.
 [[nodiscard]] WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const ThrustFit& fit, double k,
                                              std::span<const RunSums> runs);
 

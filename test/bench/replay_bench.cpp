@@ -1,6 +1,6 @@
 // What it costs to turn a recorded campaign into step means again: `kphi replay` against the same by numpy and h5py
 // (replay_peer.py), both as commands with all that their start takes, interleaved, files in the page cache. kphi takes
-// a thread per processor, numpy one; the CPU time of both is compared, too. First that both say the same.
+// all processors, numpy one; the CPU time of both is compared, too. First that both say the same.
 // Usage: kphi_replay_bench [runs [pairs]]; 15 runs are 9.1 million samples.
 #include <fmt/format.h>
 #include <unistd.h>

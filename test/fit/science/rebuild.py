@@ -59,6 +59,7 @@ class Run:
         n, x, xx = len(self.x), self.x.sum(), self.x @ self.x
         det = n * xx - x * x
         in_offset = (xx - x * self.x) / det
+        self.leverage = (xx - 2 * x * self.x + n * self.x ** 2) / det
         return in_offset @ self.T, (n * (self.x @ self.T) - x * self.T.sum()) / det, in_offset
 
 
@@ -72,14 +73,15 @@ class Angle:
         self.z = np.array([run.zero_error(run.x, wandered2(run)) for run in runs])
         lines = [run.line() for run in runs]
         rest = np.array([run.T - a - b * run.x for run, (a, b, _) in zip(runs, lines)])
-        s2, spare = rest.var(axis=0, ddof=1), rest.shape[1] / (rest.shape[1] - 2)
+        left = np.maximum(0.1, 1 - np.mean([run.leverage for run in runs], axis=0))
+        s2, spare = rest.var(axis=0, ddof=1) / left, rest.shape[1] / (rest.shape[1] - 2)
         part, xx = np.mean([run.x for run in runs], axis=0) ** 2, np.mean([run.x @ run.x for run in runs])
-        self.a = part @ s2 / xx ** 2 * spare  # (13)
+        self.a = part @ s2 / xx ** 2  # (13)
         self.a_freedom = part.sum() ** 2 / (part ** 2).sum() * (self.n - 1) / spare
         self.offset = np.array([a for a, _, _ in lines])
         in_offset = np.mean([one for _, _, one in lines], axis=0) ** 2
         offset_z = np.array([run.zero_error(one, wandered2(run)) for run, (_, _, one) in zip(runs, lines)])
-        self.b = in_offset @ s2 * spare + offset_z ** 2
+        self.b = in_offset @ s2 + offset_z ** 2
         self.shares = (np.array([run.k for run in runs]) / self.k,  # and their variance, and what a newton changes
                        (self.a + (self.z * self.per_n) ** 2) / self.k ** 2, np.full(self.n, self.per_n / self.k))
         self.z_mean = math.sqrt((self.z ** 2).sum()) / self.n

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
@@ -55,6 +56,15 @@ TEST(ScienceByNumpy, FindsTheSameCoefficientUncertaintyAndVerdict) {
     EXPECT_NEAR(found.u / expected[i].u, 1, 1e-9) << i;
     EXPECT_NEAR(found.number / expected[i].number, 1, 1e-9) << i;
   }
+}
+
+TEST(ScienceByNumpy, FindsTheExpectationAndTheScatterThatTheEquationsSay) {
+  if (!test::works("/usr/bin/python3 -c 'import numpy, scipy'"))
+    GTEST_SKIP() << "python3-numpy or python3-scipy is not installed";
+  const test::Reading said =
+      test::read_with("/usr/bin/python3 " + test::source_dir() + "/test/fit/science/simulate.py");
+  EXPECT_EQ(said.status, 0) << said.out;
+  EXPECT_GE(std::ranges::count(said.out, '\n'), 20) << said.out;
 }
 
 }  // namespace rebuild_test
