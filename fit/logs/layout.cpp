@@ -193,7 +193,7 @@ Encoding encoding_of(std::string_view text) {
 std::string describe(const Layout& layout) {
   std::string text;
   const auto line = [&](const char* what, const std::string& words) {
-    text += fmt::format("  {:<13}{}\n", what, words);
+    text += fmt::format("  {:<12} {}\n", what, words);
   };
   const std::string header = layout.header_line == 0 ? "no names" : fmt::format("names in line {}", layout.header_line);
   line("lines",
