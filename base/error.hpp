@@ -1,4 +1,4 @@
-// The errors of every room, and the exit code that the program ends with. Malformed bytes from a wire are not errors:
+// The errors of every module, and the exit code that the program ends with. Malformed bytes from a wire are not errors:
 // they are counted.
 #pragma once
 

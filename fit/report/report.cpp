@@ -156,29 +156,33 @@ std::string figure_section(const Figures& figures, std::size_t begin, std::size_
   return drawn.empty() ? "" : html_heading(heading) + "<div class=\"figures\">\n" + drawn + "</div>\n";
 }
 
-/// The first figure belongs to the headline, the others follow the table. On a page of several propellers each chapter
-/// prints on two pages: standard air, the budget and the last figures move into its appendix, which prints if opened.
+/// On a page of several propellers each chapter prints on two pages: standard air, the budget and the figures after
+/// these move into its appendix, behind all chapters.
+constexpr std::size_t kFiguresOfChapter = 5;
+
+/// The first figure belongs to the headline, the others follow the table.
 std::string body(const Fitted& fitted, const Chapter& chapter, int& number, bool alone) {
   const auto& [identification, analysis] = fitted;
-  const Provenance& provenance = chapter.provenance;
   const Figures& figures = chapter.figures;
-  const std::size_t shown = alone ? figures.drawn.size() : 5;
   std::string html =
-      origin_banner(provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
+      origin_banner(chapter.provenance.origin) + verdict_box(analysis.flight) + lead(identification) + headline(fitted);
   html += figure_blocks(figures, 0, 1, number) + skipped_note(figures) + remark_section(analysis.remarks) +
           coefficient_section(fitted) + (chapter.claims ? own_claims_section(fitted) : "");
   if (alone) html += standard_section(fitted) + stand_section(chapter.drawing) + vehicle_section(chapter);
-  html += figure_section(figures, 1, shown, "How well the model holds", number);
-  const std::string more = analysis_sections(analysis) + campaign_sections(identification, provenance);
-  if (alone) html += more;
-  html += fmt::format(
-      "<details class=\"appendix\"{}><summary>Appendix: {}tests, torque, power, steps left out, runs and "
-      "their hashes</summary>\n",
-      alone ? " open=\"open\"" : "", alone ? "" : "standard air, uncertainty budget, k in flight, provenance, ");
+  html +=
+      figure_section(figures, 1, alone ? figures.drawn.size() : kFiguresOfChapter, "How well the model holds", number);
+  if (alone) html += analysis_sections(analysis) + campaign_sections(identification, chapter.provenance);
+  return html;
+}
+
+std::string appendix(const Fitted& fitted, const Chapter& chapter, const std::string& of, int& number, bool alone) {
+  const auto& [identification, analysis] = fitted;
+  std::string html = fmt::format("<h2{}>Appendix{}</h2>\n", alone ? "" : " class=\"chapter\"", of);
   if (!alone)
-    html +=
-        standard_section(fitted) + figure_section(figures, shown, figures.drawn.size(), "More figures", number) + more;
-  return html + analysis_appendix(analysis) + campaign_appendix(identification, provenance) + "</details>\n";
+    html += standard_section(fitted) +
+            figure_section(chapter.figures, kFiguresOfChapter, chapter.figures.drawn.size(), "More figures", number) +
+            analysis_sections(analysis) + campaign_sections(identification, chapter.provenance);
+  return html + analysis_appendix(analysis) + campaign_appendix(identification, chapter.provenance);
 }
 
 }  // namespace
@@ -190,7 +194,7 @@ std::string format_report(const Fitted& fitted, const Chapter& chapter) {
                                                              : std::pair("k(φ)", "how an occlusion costs thrust");
   return page_head(what + (" of " + name), name + ": " + subject,
                    propeller_line(fitted.identification, chapter.provenance)) +
-         body(fitted, chapter, number, true) + kPageEnd;
+         body(fitted, chapter, number, true) + appendix(fitted, chapter, "", number, true) + kPageEnd;
 }
 
 std::string format_reports(std::span<const Fitted> family, std::span<const Chapter> chapters, const Figures& together,
@@ -209,6 +213,9 @@ std::string format_reports(std::span<const Fitted> family, std::span<const Chapt
                           propeller_line(family[i].identification, provenance)) +
               body(family[i], chapters[i], number, false);
   }
+  for (std::size_t i = 0; i < family.size(); ++i)
+    bodies += appendix(family[i], chapters[i], ": " + propeller_line(family[i].identification, chapters[i].provenance),
+                       number, false);
   const std::string navigation = "<nav>" + contents + "</nav>\n";
   if (std::ranges::all_of(family, [](const Fitted& one) { return one.identification.alone(); }))
     return page_head("K_T of " + names, "K_T of several logs, without occlusions", names) + navigation +

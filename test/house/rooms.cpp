@@ -52,7 +52,7 @@ const Room* room_of(std::string_view path) {
 std::vector<std::string> violations(const std::string& path, const std::string& text) {
   static const std::regex kInclude(R"(^\s*#\s*include\s*([<"])([^">]+)[">])");
   const Room* room = room_of(path);
-  if (room == nullptr) return {path + ": is in none of the rooms"};
+  if (room == nullptr) return {path + ": is in none of the modules"};
   std::vector<std::string> found;
   std::istringstream lines(text);
   std::string line;

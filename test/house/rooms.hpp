@@ -1,4 +1,4 @@
-// The rooms of the house from the ground floor up, and who may see whom. The table is the rule.
+// The modules of the codebase from the lowest layer up, and who may see whom. The table is the rule.
 #pragma once
 
 #include <string>
@@ -8,13 +8,13 @@
 namespace kphi::house {
 
 /// A folder and what its files may include from this repository besides their own folder. An entry names a folder (with
-/// all rooms in it that stand earlier in the table) or one header.
+/// all modules in it that stand earlier in the table) or one header.
 struct Room {
   std::string_view folder;
   std::vector<std::string_view> sees;
 };
 
-/// Nobody sees a room that stands later: no arrow runs up, and there is no circle.
+/// Nobody sees a module that stands later: no arrow runs up, and there is no circle.
 inline const std::vector<Room>& rooms() {
   static const std::vector<Room> kRooms{
       {"base", {}},
@@ -78,7 +78,7 @@ inline const std::vector<Room>& rooms() {
       {"fit/logs", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
       {"fit/flights", {"base", "compensation", "profiles/profile_reader.hpp", "results", "fit"}},
       {"fit/propellers", {"base", "compensation", "results", "fit"}},
-      // Of a campaign that was not run yet: the only room of the fit that sees one.
+      // Of a campaign that was not run yet: the only module of the fit that sees one.
       {"fit/plan", {"base", "compensation", "profiles", "results", "fit"}},
       {"fit/coefficients", {"base", "compensation", "profiles/vehicle.hpp", "results", "fit"}},
       {"fit/report", {"base", "compensation", "results", "fit"}},
@@ -98,7 +98,7 @@ inline const std::vector<Room>& rooms() {
 /// At most this many units (a header and its source are one) side by side.
 inline constexpr int kUnitsSideBySide = 20;
 
-/// The room of a file; nullptr: of none.
+/// The module of a file; nullptr: of none.
 [[nodiscard]] const Room* room_of(std::string_view path);
 
 /// What the file at `path` (from the repository's root) includes against the rules: "path:line: …".

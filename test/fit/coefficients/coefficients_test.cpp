@@ -123,8 +123,14 @@ void collect_keys(const YAML::Node& node, const std::string& path, std::set<std:
 std::set<std::string> keys_in_readme() {
   std::ifstream page(test::source_dir() + "/fit/coefficients/README.md");
   std::set<std::string> keys;
-  for (std::string line; std::getline(page, line);)
-    if (line.starts_with("| `")) keys.insert(line.substr(3, line.find('`', 3) - 3));
+  for (std::string line; std::getline(page, line);) {
+    if (!line.starts_with("| `")) continue;
+    const std::string key = line.substr(3, line.find('`', 3) - 3);
+    const std::size_t brace = key.find('{');  // a.{b, c}: a.b and a.c
+    std::istringstream words(brace == key.npos ? " " + key : key.substr(brace + 1));
+    for (std::string word; words >> word;)
+      keys.insert(key.substr(0, brace == key.npos ? 0 : brace) + word.substr(0, word.find_first_of(",}")));
+  }
   return keys;
 }
 

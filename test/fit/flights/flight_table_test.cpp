@@ -6,10 +6,10 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "base/error.hpp"
 #include "fit/flights/flight_log.hpp"
+#include "results/file_layer.hpp"
 #include "test/refusal.hpp"
 #include "test/source_dir.hpp"
 #include "test/temporary_folder.hpp"
@@ -26,17 +26,7 @@ FlightLayout layout_of(const std::string& series, const std::string& more = "") 
 
 const std::string kTime = "  - {channel: time, series: 't', unit: ms}\n";
 
-/// The layout of a decoded blackbox as the room's page shows it.
-std::string layout_on_page() {
-  std::ifstream file(test::source_dir() + "/fit/flights/README.md");
-  std::stringstream page;
-  page << file.rdbuf();
-  const std::string text = page.str();
-  const std::size_t begin = text.find("format: kphi-flight-layout/1");
-  return text.substr(begin, text.find("```", begin) - begin);
-}
-
-TEST(FlightTable, ReadsADecodedBlackboxByTheLayoutOnThePage) {
+TEST(FlightTable, ReadsADecodedBlackboxByTheShippedLayout) {
   std::string csv =
       "loopIteration, time (us), gyroADC[0], gyroADC[1], gyroADC[2], accSmooth[0], accSmooth[1], accSmooth[2], "
       "motor[0], "
@@ -44,7 +34,9 @@ TEST(FlightTable, ReadsADecodedBlackboxByTheLayoutOnThePage) {
   for (int k = 0; k < 3; ++k)
     csv += fmt::format("{}, {}, 90, -90, 45, 0, 1024, {}, 48, 0, 1047, 2047, 1400, 700, 70, 7, 16.1\n", k,
                        1'000'000 + 500 * k, 2048 + 2048 * k);
-  const FlightLog log = parse_flight(csv, "flight.01.csv", parse_flight_layout(layout_on_page(), "betaflight.yaml"));
+  const std::string shipped = test::source_dir() + "/profiles/betaflight_layout.yaml";
+  const FlightLog log =
+      parse_flight(csv, "flight.01.csv", parse_flight_layout(results::read_text(shipped), "betaflight.yaml"));
   EXPECT_EQ(log.format, "table");
   EXPECT_THAT(log.specific_force[2].time_s,
               ElementsAre(0, testing::DoubleNear(5e-4, 1e-9), testing::DoubleNear(1e-3, 1e-9)));
