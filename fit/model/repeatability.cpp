@@ -100,7 +100,8 @@ WithinRuns scatter_within_runs(std::span<const results::StepMean> steps, const T
     LevelResiduals& level = levels[steps[i].step];
     level.wx += w * x;
     if (lines) level.in_offset += run.in_offset(w, x);
-    level.leverage += lines ? run.leverage(w, x) : w * x * x / run.xx;
+    level.leverage +=
+        lines ? run.in_offset(w, x) + w * x * (run.w * x - run.x) / run.determinant() : w * x * x / run.xx;
     level.sum += residual;
     level.squares += residual * residual;
     ++level.count;

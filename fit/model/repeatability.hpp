@@ -36,10 +36,6 @@ struct RunSums {
   [[nodiscard]] double slope() const { return (w * xt - x * t) / determinant(); }    ///< of that
   /// Change of offset() for 1 N of a step.
   [[nodiscard]] double in_offset(double w1, double x1) const { return w1 * (xx - x * x1) / determinant(); }
-  /// Share of a step's own error that its line follows.
-  [[nodiscard]] double leverage(double w1, double x1) const {
-    return in_offset(w1, x1) + w1 * x1 * (w * x1 - x) / determinant();
-  }
   [[nodiscard]] double determinant() const { return w * xx - x * x; }
 };
 
