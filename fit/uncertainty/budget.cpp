@@ -24,7 +24,7 @@ struct Entry {
   std::optional<double> BenchUncertainty::*member;
   double unit;
   double assumed = kNotKnown;  ///< where nobody measured it, in `unit`
-  const char* why = "";       ///< that much
+  const char* why = "";        ///< that much
   const char* remedy = "";
 };
 
