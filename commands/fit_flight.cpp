@@ -19,6 +19,7 @@
 #include "fit/flights/flight_layout.hpp"
 #include "fit/flights/flight_log.hpp"
 #include "fit/flights/flight_result.hpp"
+#include "fit/flights/speed_check.hpp"
 #include "fit/report/fit_summary.hpp"
 #include "fit/report/flight_figures.hpp"
 #include "fit/report/report.hpp"
@@ -45,7 +46,7 @@ LoggedVehicle flown_vehicle(const FlightFitRequest& request, const profiles::Veh
     vehicle.build_known = true;
     vehicle.mass_kg = file.dynamics->mass_kg;
   }
-  if (request.mass_kg) vehicle.mass_kg = vehicle.build.mass_kg = *request.mass_kg;
+  if (request.mass_kg) vehicle.mass_kg = vehicle.build.mass_kg = *request.mass_kg, vehicle.weighed = true;
   if (!(vehicle.mass_kg > 0))
     throw ConfigurationError(file.path +
                              ": no dynamics.mass_kg; weigh the vehicle with its battery and give --mass KG");
@@ -90,7 +91,7 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   const profiles::Vehicle file = profiles::load_vehicle(request.vehicle);
   const FlightLayout layout =
       request.layout.empty() ? FlightLayout{} : parse_flight_layout(results::read_text(request.layout), request.layout);
-  const FlightLog log = read_flight(request.path, layout);
+  FlightLog log = read_flight(request.path, layout);
   print_log_findings(log);
   LoggedVehicle vehicle = flown_vehicle(request, file, log);
   FlightPriors priors;
@@ -99,14 +100,17 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
     if (vehicle.build.air_drag_per_s > 0) priors.drag = vehicle.build.air_drag_per_s;
   }
   for (const std::string& text : request.uncertainties) set_flight_uncertainty(priors, vehicle, text);
+  const SpeedCheck speeds = check_speeds(log, profiles::rotors_of(file), request.blades);
+  correct_speeds(log, speeds, priors);
   const FlownBins flown = flown_bins(log, vehicle);
   const FlightFit fit = fit_flight(flown, vehicle, priors);
 
-  IdentificationOptions options{.propeller = request.propeller.empty() ? file.name : request.propeller,
+  IdentificationOptions options{.curve = {.form = request.form},
+                                .propeller = request.propeller.empty() ? file.name : request.propeller,
                                 .diameter_in = 2 * file.propeller_radius.value() / 0.0254,
                                 .blades = request.blades,
                                 .overlap = file.overlap};
-  const Fitted fitted = fitted_of(fit, flown, options, request.limits);
+  const Fitted fitted = fitted_of(fit, flown, vehicle, speeds, options, request.limits);
   Provenance provenance;
   provenance.origin = log.format == "table" ? Origin::unknown : Origin::measured;
   provenance.tool_version = kVersion;
@@ -121,10 +125,10 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   write_output(out, text);
   if (request.json) {
     Json json = fit_json(fitted.identification, fitted.analysis, out);
-    json["flight"] = flight_json(fit, flown);
+    json["flight"] = flight_json(fit, flown, speeds);
     print_json(json);
   } else {
-    fmt::print("{}{}", flight_words(fit, flown, vehicle), headline_text(fitted));
+    fmt::print("{}{}", flight_words(fit, flown, vehicle, speeds), headline_text(fitted));
   }
   std::string there;
   if (const auto error = error_in_flight(compensation::parse_coefficients(text, out.string()), file)) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "fit/model/curve_fit.hpp"
 #include "fit/uncertainty/readiness.hpp"
 
 namespace kphi::commands {
@@ -13,6 +14,7 @@ namespace kphi::commands {
 struct FlightFitRequest {
   std::string path, vehicle, layout, shape, out, propeller, bench;
   int blades = 0;
+  fit::CurveForm form = fit::CurveForm::line;
   std::optional<double> mass_kg;
   std::vector<std::string> uncertainties;  ///< as fit::set_flight_uncertainty
   fit::ReadinessLimits limits;

@@ -333,7 +333,7 @@ ExitCode run_flight(const FitRequest& request) {
   refuse(options.estimator != Estimator::through_origin, "--estimator");
   refuse(options.weighting != Weighting::equal, "--weights");
   refuse(options.loss != Loss::none || options.curve.loss != Loss::none, "--loss or --curve-loss");
-  refuse(options.curve.form != CurveForm::line || !options.curve.points_deg.empty(), "--form or --points");
+  refuse(!options.curve.points_deg.empty(), "--points");
   refuse(request.at_speed_rpm || !request.speed_range_rpm.empty(), "--at-speed-rpm or --speed-range-rpm");
   refuse(!request.left_out.empty() || !request.family.empty() || request.raw, "--leave-out, --family or --raw");
   return fit_flight_log({.path = request.path,
@@ -344,6 +344,7 @@ ExitCode run_flight(const FitRequest& request) {
                          .propeller = options.propeller,
                          .bench = request.bench,
                          .blades = options.blades,
+                         .form = options.curve.form,
                          .mass_kg = request.mass_kg,
                          .uncertainties = request.uncertainties,
                          .limits = limits_of(request),

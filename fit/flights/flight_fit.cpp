@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <span>
+#include <utility>
 
-#include "base/csv.hpp"
 #include "base/error.hpp"
 #include "base/number.hpp"
 #include "base/statistics.hpp"
@@ -22,58 +24,10 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr double kLeastTurning = 10;  // s in which roll and pitch can be followed
-constexpr double kLeastFold = 5;      // degrees of φ that tell a slope
-constexpr double kBlock = 6;          // s: three times the memory of the slowest noise that is expected
+constexpr double kBlock = 6;  // s: three times the memory of the slowest noise that is expected
 constexpr std::size_t kLeastBlocks = 4, kMostBlocks = 60;
 constexpr double kShock = 6;    // deviations
 constexpr double kWeak = 0.03;  // of a rotor beside the others, to be named
-
-/// The free numbers of a flight, with what is known of them.
-std::vector<FreeNumber> numbers_of(const FlownBins& flown, const FlightPriors& priors, double wide_deg) {
-  std::vector<FreeNumber> free{{kLevel, 1, 0, "K_T", "1"}};
-  if (wide_deg > 0) free.push_back({kRatio, 1, 0, "k/K_T", "1"});
-  free.push_back({kScale, 0, priors.scale_u, "accelerometer scale", "1"});
-  free.push_back({kBias, 0, priors.bias_u, "accelerometer zero", "m/s^2"});
-  free.push_back({kDrag, priors.drag, priors.drag_u, "drag of climb", "1/s"});
-  free.push_back({kForward, 0, priors.forward_u, "lift of forward flight", "s^2/m"});
-  if (flown.drive.commands) {
-    free.push_back({kTiming, priors.lag, priors.lag_u, "lag", "s"});
-    free.push_back({kLaw, priors.law, priors.law_u, "THR_MDL_FAC", "1"});
-    if (!flown.drive.volts.empty()) free.push_back({kSag, priors.sag, priors.sag_u, "speed per voltage", "1"});
-  } else {
-    free.push_back({kTiming, 0, priors.delay_u, "delay of the speeds", "s"});
-  }
-  const auto turning = std::ranges::count_if(flown.bins, &FlownBin::turns);
-  if (static_cast<double>(turning) * flown.width_s > kLeastTurning) {
-    free.push_back({kRollGain, 1, priors.inertia_u, "moment of inertia, roll", "1"});
-    free.push_back({kPitchGain, 1, priors.inertia_u, "moment of inertia, pitch", "1"});
-    free.push_back({kCentreY, 0, priors.gravity_centre_u, "centre of gravity, y", "m"});
-    free.push_back({kCentreX, 0, priors.gravity_centre_u, "centre of gravity, x", "m"});
-  }
-  for (std::size_t i = 0; i < flown.rotors; ++i)
-    free.push_back({kRotors + i, 0, priors.rotor_u, fmt::format("rotor {}", i + 1), "1"});
-  return free;
-}
-
-const char* group_of(std::size_t which) {
-  switch (which) {
-    case kScale:
-      return "accelerometer scale";
-    case kBias:
-      return "accelerometer zero";
-    case kDrag:
-    case kForward:
-      return "air drag and inflow";
-    case kTiming:
-      return "clock or lag of the rotors";
-    case kLaw:
-    case kSag:
-      return "law of throttle and voltage";
-    default:
-      return "rotors that differ";
-  }
-}
 
 /// Pieces of time that are taken as independent of each other.
 struct Blocks {
@@ -108,15 +62,14 @@ class Fitting {
  public:
   Fitting(const FlownBins& flown, const LoggedVehicle& vehicle, const FlightPriors& priors)
       : flown_(flown), vehicle_(vehicle), priors_(priors), blocks_(blocks_of(flown)) {
-    const Excitation& done = flown.excitation;
-    if (done.widest_deg > kLeastFold && done.folds > 0 && done.seconds_folded > 2 &&
-        done.seconds - done.seconds_folded > 2)
-      fit_.wide_deg = std::round(10 * done.widest_deg) / 10;  // as files and people name it
+    for (const double phi : flown.excitation.knots_deg) fit_.kept.push_back({phi, {}});
   }
 
   FlightFit fit() {
     if (!(vehicle_.mass_kg > 0)) throw FitError("the mass of the vehicle is not known; --mass KG says it");
-    FlightModel model(flown_, numbers_of(flown_, priors_, fit_.wide_deg), vehicle_.mass_kg, fit_.wide_deg * kPi / 180,
+    std::vector<double> knots;
+    for (const KeptThrust& one : fit_.kept) knots.push_back(from_degrees(one.phi_deg).value());
+    FlightModel model(flown_, free_numbers(flown_, priors_), std::move(knots), vehicle_.mass_kg,
                       vehicle_.airframe.fastest_speed.value());
     model.hover = hover_of(model);
     values_ = model.start();
@@ -266,25 +219,25 @@ class Fitting {
       freedom_[i] = std::max(1.0, sum * sum / squares - 1);
     }
     fit_.blocks = blocks_.count;
-    prior_ = Matrix::Zero(columns, columns);
-    for (Eigen::Index i = 0; i < columns; ++i) {
-      const double before = model.free()[static_cast<std::size_t>(i)].before_u;
-      if (before > 0) prior_.col(i) = inverse_.col(i) / before;
-    }
-    late_ = flown_.drive.commands ? effect_of_stamps(model) : Vector(Vector::Zero(columns));
-    whole_ = noise_ + prior_ * prior_.transpose() + late_ * late_.transpose();
+    for (std::size_t i = 0; i < model.free().size(); ++i)
+      if (const double before = model.free()[i].before_u; before > 0)
+        known_.push_back({group_of(model.free()[i].which), inverse_.col(static_cast<Eigen::Index>(i)) / before});
+    for (const FreeNumber& one : considered_numbers(flown_, priors_))
+      known_.push_back({group_of(one.which), effect_of(model, one)});
+    whole_ = noise_;
+    for (const Known& one : known_) whole_ += one.effect * one.effect.transpose();
   }
 
-  /// On all numbers, of stamps that are late by their standard uncertainty.
-  Vector effect_of_stamps(FlightModel& model) const {
+  /// On all free numbers, of one that is not free, wrong by its standard uncertainty.
+  Vector effect_of(FlightModel& model, const FreeNumber& number) const {
     const Eigen::Index count = model.num_residuals();
     std::array<Vector, 2> rows{Vector(count), Vector(count)};
     double const* parameters = values_.data();
     for (std::size_t side = 0; side < 2; ++side) {
-      model.stamp = (side == 0 ? -1 : 1) * priors_.stamp_u;
+      model.given[number.which] = number.before + (side == 0 ? -1 : 1) * number.before_u;
       model.Evaluate(&parameters, rows[side].data(), nullptr);
     }
-    model.stamp = 0;
+    model.given[number.which] = number.before;
     return inverse_ * (jacobian_.transpose() * (rows[1] - rows[0]) / 2);
   }
 
@@ -295,63 +248,71 @@ class Fitting {
     return {values_[i], std::sqrt(all), noise > 0 ? freedom_[at] * square(all / noise) : kEndless};
   }
 
-  /// From level and ratio to K_T and k at the widest φ.
-  [[nodiscard]] Eigen::Matrix<double, 2, Eigen::Dynamic> to_k(double hover) const {
-    Eigen::Matrix<double, 2, Eigen::Dynamic> to = Eigen::MatrixXd::Zero(2, jacobian_.cols());
-    const double ratio = fit_.alone() ? 1 : values_[1];
+  /// From level and ratios to K_T and k at the knots.
+  [[nodiscard]] Matrix to_k(double hover) const {
+    const auto knots = static_cast<Eigen::Index>(fit_.kept.size());
+    Matrix to = Matrix::Zero(1 + knots, jacobian_.cols());
     to(0, 0) = hover;
-    to(1, 0) = hover * ratio;
-    if (!fit_.alone()) to(1, 1) = hover * values_[0];
+    for (Eigen::Index j = 1; j <= knots; ++j) {
+      to(j, 0) = hover * values_[static_cast<std::size_t>(j)];
+      to(j, j) = hover * values_[0];
+    }
     return to;
   }
 
-  /// A covariance of the two as sources that are independent of each other.
-  void add(const std::string& name, Evaluation evaluation, const Eigen::Matrix2d& covariance, double freedom,
-           double freedom_of_ratio, const std::string& note, const std::string& remedy) {
-    const double first = std::sqrt(std::max(0.0, covariance(0, 0)));
-    const double along = first > 0 ? covariance(1, 0) / first : 0;
-    const double second = std::sqrt(std::max(0.0, covariance(1, 1) - along * along));
-    fit_.sources.push_back({name, evaluation, note, remedy, first, along, freedom});
-    if (!fit_.alone() && second > 1e-4 * fit_.k_t)
-      fit_.sources.push_back({name + ", of k(phi)/K_T", evaluation, note, remedy, 0, second, freedom_of_ratio});
+  /// A covariance of K_T and the k at the knots, as sources that are independent of each other: each column of its
+  /// root is one.
+  void add(const std::string& name, Evaluation evaluation, Matrix covariance, std::span<const double> freedom,
+           const std::string& note, const std::string& remedy) {
+    for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+      const double deviation = std::sqrt(std::max(0.0, covariance(i, i)));
+      if (i > 0 && !(deviation > 1e-4 * fit_.k_t)) continue;
+      Vector column = Vector::Zero(covariance.rows());
+      if (deviation > 0) column = covariance.col(i) / deviation;
+      column.head(i).setZero();
+      covariance -= column * column.transpose();
+      const auto knot = static_cast<std::size_t>(i);
+      fit_.sources.push_back({i == 0 ? name : fmt::format("{}, of k({:g}°)/K_T", name, fit_.kept[knot - 1].phi_deg),
+                              evaluation,
+                              note,
+                              remedy,
+                              {column.begin(), column.end()},
+                              freedom.empty() ? kEndless : freedom[knot]});
+    }
   }
 
-  void add_sources(const FlightModel& model, double hover) {
-    const auto to = to_k(hover);
-    add("noise of the flight", Evaluation::type_a, to * noise_ * to.transpose(), freedom_[0],
-        fit_.alone() ? kEndless : freedom_[1],
+  void add_sources(double hover) {
+    const Matrix to = to_k(hover);
+    add("noise of the flight", Evaluation::type_a, to * noise_ * to.transpose(),
+        {freedom_.data(), fit_.kept.size() + 1},
         fmt::format("{} pieces of {:.0f} s, left out in turn", blocks_.count,
                     flown_.excitation.seconds / static_cast<double>(blocks_.count)),
         "fly longer, and fold and unfold more often");
-    std::vector<std::string> names;
-    for (const FreeNumber& one : model.free())
-      if (one.before_u > 0 && std::ranges::count(names, group_of(one.which)) == 0)
-        names.emplace_back(group_of(one.which));
-    for (const std::string& name : names) {
-      Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-      for (std::size_t i = 0; i < model.free().size(); ++i) {
-        if (!(model.free()[i].before_u > 0) || group_of(model.free()[i].which) != name) continue;
-        const Eigen::Vector2d effect = to * prior_.col(static_cast<Eigen::Index>(i));
-        covariance += effect * effect.transpose();
-      }
-      if (name == group_of(kTiming)) covariance += to * late_ * (to * late_).transpose();
-      add(name, Evaluation::type_b, covariance, kEndless, kEndless, "what is known of it without the flight", "");
+    std::map<std::string, Matrix> groups;
+    for (const Known& one : known_) {
+      const Vector effect = to * one.effect;
+      Matrix& sum = groups.try_emplace(one.group, Matrix::Zero(effect.size(), effect.size())).first->second;
+      sum += effect * effect.transpose();
     }
-    const Eigen::Vector2d k(fit_.k_t, fit_.k_t * (fit_.alone() ? 1 : fit_.ratio.value));
+    Vector k = Vector::Constant(to.rows(), fit_.k_t);
+    for (std::size_t j = 0; j < fit_.kept.size(); ++j) k[static_cast<Eigen::Index>(j) + 1] *= fit_.kept[j].ratio.value;
     const auto shared = [&](const char* name, double u, const std::string& note, const char* remedy) {
-      add(name, Evaluation::type_b, u * u * k * k.transpose(), kEndless, kEndless, note, remedy);
+      add(name, Evaluation::type_b, u * u * k * k.transpose(), {}, note, remedy);
     };
+    for (const auto& [name, covariance] : groups)
+      add(name, Evaluation::type_b, covariance, {}, "what is known of it without the flight", "");
     shared("mass", vehicle_.mass_u, fmt::format("{:g} kg to {:g} %", vehicle_.mass_kg, 100 * vehicle_.mass_u),
            "weigh the vehicle with its battery (--mass, --u mass=)");
     if (flown_.drive.commands)
       shared("speed at full command", 2 * priors_.full_speed_u, "that of the vehicle file, for the mean voltage",
              "log the rotors' speeds");
     else
-      shared("speed calibration", 2 * priors_.speed_u, "pole count and clock of the speed controllers", "");
+      shared("speed calibration", 2 * priors_.speed_u, priors_.speed_note,
+             "let the vibration tell it: log raw acceleration at 500 Hz, and say --blades");
     double squares = 0, spread = 0;
     for (const FlightErrorSource& one : fit_.sources) {
-      squares += square(one.of_k_t);
-      spread += square(square(one.of_k_t)) / one.freedom;
+      squares += square(one.of.front());
+      spread += square(square(one.of.front())) / one.freedom;
     }
     fit_.k_t_u = std::sqrt(squares);
     fit_.k_t_freedom = spread > 0 ? squares * squares / spread : kEndless;
@@ -362,7 +323,7 @@ class Fitting {
     const double n = static_cast<double>(flown_.rotors), beside = n / (n - 1);
     fit_.rotors_told = true;
     for (std::size_t i = 0; i < model.free().size(); ++i) {
-      if (model.free()[i].which < kRotors) continue;
+      if (model.free()[i].which < kKnots + fit_.kept.size()) continue;
       Estimate one = estimate(i);
       one.value *= beside;
       one.u *= beside;
@@ -379,20 +340,17 @@ class Fitting {
 
   void report(const FlightModel& model, double hover) {
     fit_.k_t = hover * values_[0];
-    if (!fit_.alone())
-      fit_.ratio = estimate(1);
-    else
-      fit_.ratio = {1, 0, kEndless};
+    for (std::size_t j = 0; j < fit_.kept.size(); ++j) fit_.kept[j].ratio = estimate(j + 1);
     if (!(fit_.k_t > 0)) throw FitError("thrust does not rise with the speed of the rotors in this flight");
     for (std::size_t i = 0; i < model.free().size(); ++i) {
       const FreeNumber& one = model.free()[i];
       if (!(one.before_u > 0)) continue;
       if (one.which == kTiming && flown_.drive.commands) fit_.lag_s = estimate(i);
       if (one.which == kLaw) fit_.law = estimate(i);
-      if (one.which < kRotors) fit_.nuisances.push_back({one.name, one.unit, estimate(i), one.before, one.before_u});
+      if (one.which < kKnots) fit_.nuisances.push_back({one.name, one.unit, estimate(i), one.before, one.before_u});
     }
     take_rotors(model);
-    add_sources(model, hover);
+    add_sources(hover);
     std::vector<double> speeds;
     for (const auto& bin : squares_at(model, values_))
       for (const double one : bin) speeds.push_back(std::sqrt(one));
@@ -412,31 +370,18 @@ class Fitting {
   Blocks blocks_;
   std::vector<double> values_, rows_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> jacobian_;
-  Matrix inverse_, noise_, prior_, whole_;
-  Vector freedom_, late_;
+  Matrix inverse_, noise_, whole_;
+  Vector freedom_;
+  /// What is known before of one number, wrong by its standard uncertainty, moves all free ones by this.
+  struct Known {
+    std::string group;
+    Vector effect;
+  };
+  std::vector<Known> known_;
   FlightFit fit_;
 };
 
 }  // namespace
-
-void set_flight_uncertainty(FlightPriors& priors, LoggedVehicle& vehicle, const std::string& text) {
-  const std::size_t equals = text.find('=');
-  const double value = equals == std::string::npos ? -1 : parse_number(text.substr(equals + 1)).value_or(-1);
-  const struct {
-    const char* name;
-    double* u;
-  } entries[] = {{"mass", &vehicle.mass_u}, {"scale", &priors.scale_u}, {"bias", &priors.bias_u},
-                 {"drag", &priors.drag_u},  {"speed", &priors.speed_u}, {"full-speed", &priors.full_speed_u}};
-  for (const auto& entry : entries) {
-    if (text.substr(0, equals) != entry.name || !(value > 0)) continue;
-    *entry.u = value;
-    return;
-  }
-  throw ConfigurationError(fmt::format(
-      "--u {}: of a flight expected NAME=VALUE, NAME one of mass, scale, speed, full-speed (relative: 0.003 "
-      "is 0.3 %), bias (m/s^2) or drag (1/s), VALUE a standard uncertainty above 0",
-      text));
-}
 
 FlightFit fit_flight(const FlownBins& flown, const LoggedVehicle& vehicle, const FlightPriors& priors) {
   return Fitting(flown, vehicle, priors).fit();

@@ -7,42 +7,21 @@
 #include <string>
 #include <vector>
 
+#include "fit/flights/flight_priors.hpp"
 #include "fit/flights/flown_bins.hpp"
 #include "fit/numerics/hypothesis_test.hpp"
 #include "fit/uncertainty/budget.hpp"
 
 namespace kphi::fit {
 
-/// What is known of the flight without it: standard uncertainties, each of the unit that its comment names.
-struct FlightPriors {
-  double scale_u = 0.005;           ///< 1: accelerometer's scale
-  double bias_u = 0.05;             ///< m/s²: its zero
-  double drag = 0.4;                ///< 1/s: force per mass and climb rate
-  double drag_u = 0.25;             ///< 1/s
-  double forward_u = 0.02;          ///< 1/(m/s²): specific force along z per square of that across
-  double inertia_u = 0.3;           ///< 1: moments of inertia of the vehicle file
-  double gravity_centre_u = 0.005;  ///< m: centre of gravity of the vehicle file
-  double rotor_u = 0.05;            ///< 1: one rotor beside the mean of all
-  double delay_u = 0.02;            ///< s: clock of the speeds beside that of the accelerometer
-  double lag = 0.05, lag_u = 0.05;  ///< s: rotor behind command
-  double stamp_u = 0.001;           ///< s: stamps of the commands beside those of the accelerometer
-  double law = 0.6, law_u = 0.3;    ///< 1: share of u² in the thrust over the command u, PX4's THR_MDL_FAC
-  double sag = 0.5, sag_u = 0.5;    ///< 1: relative speed per relative voltage
-  double speed_u = 0.002;           ///< 1: all logged speeds together
-  double full_speed_u = 0.05;       ///< 1: speed at full command, of a log with commands
-};
-
-/// "NAME=VALUE", NAME one of mass, scale, bias, drag, speed, full-speed. Throws ConfigurationError.
-void set_flight_uncertainty(FlightPriors& priors, LoggedVehicle& vehicle, const std::string& text);
-
-/// A part of the errors of K_T and of k at the widest φ, one standard deviation, with sign: they move together.
+/// A part of the errors of K_T and of k at each knot, one standard deviation, with sign: they move together.
 struct FlightErrorSource {
   std::string name;
   Evaluation evaluation = Evaluation::type_b;
   std::string note;
   std::string remedy;
-  double of_k_t = 0, of_k_wide = 0;  ///< N/(rad/s)²
-  double freedom = 0;                ///< inf of type B
+  std::vector<double> of;  ///< K_T first, N/(rad/s)²
+  double freedom = 0;      ///< inf of type B
 };
 
 /// A number that was fitted beside k, and what was known of it before.
@@ -53,11 +32,16 @@ struct FlightNuisance {
   [[nodiscard]] bool told() const { return value.u < 0.5 * before_u; }
 };
 
+/// What is left of K_T at one φ.
+struct KeptThrust {
+  double phi_deg = 0;
+  Estimate ratio;
+};
+
 struct FlightFit {
-  double k_t = 0;       ///< N/(rad/s)², mean of the rotors, in the air of the flight
-  double wide_deg = 0;  ///< widest φ flown for a second; 0: no rotor was covered, K_T alone
-  Estimate ratio;       ///< k(wide)/K_T
-  double k_t_u = 0;     ///< the whole standard uncertainty, N/(rad/s)²
+  double k_t = 0;                ///< N/(rad/s)², mean of the rotors, in the air of the flight
+  std::vector<KeptThrust> kept;  ///< at the φ that were flown, ascending; empty: no rotor was covered, K_T alone
+  double k_t_u = 0;              ///< the whole standard uncertainty, N/(rad/s)²
   double k_t_freedom = 0;
   std::vector<FlightErrorSource> sources;
   std::vector<FlightNuisance> nuisances;
@@ -72,10 +56,11 @@ struct FlightFit {
   std::vector<double> residuals;  ///< along z, one for each bin, m/s²
   std::vector<std::string> remarks;
 
-  [[nodiscard]] bool alone() const { return wide_deg == 0; }
-  [[nodiscard]] double k_at(double phi_deg) const {
-    return k_t * (alone() ? 1 : 1 - (1 - ratio.value) * phi_deg / wide_deg);
-  }
+  [[nodiscard]] bool alone() const { return kept.empty(); }
+  /// Widest φ flown for a second; 0: no rotor was covered.
+  [[nodiscard]] double wide_deg() const { return alone() ? 0 : kept.back().phi_deg; }
+  /// k/K_T there.
+  [[nodiscard]] Estimate ratio() const { return alone() ? Estimate{1, 0} : kept.back().ratio; }
 };
 
 /// Throws FitError, one line, where the flight contradicts the vehicle or leaves too little to fit.

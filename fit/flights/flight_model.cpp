@@ -14,15 +14,17 @@ constexpr double kMeanOfRotors = 1e-5;
 
 }  // namespace
 
-FlightModel::FlightModel(const FlownBins& flown, std::vector<FreeNumber> free, double mass_kg, double wide_rad,
-                         double fastest)
-    : shock(flown.bins.size(), 0),
+FlightModel::FlightModel(const FlownBins& flown, std::vector<FreeNumber> free, std::vector<double> knots_rad,
+                         double mass_kg, double fastest)
+    : given(kKnots + knots_rad.size() + flown.rotors, 0),
+      shock(flown.bins.size(), 0),
       flown_(&flown),
       free_(std::move(free)),
-      column_(kRotors + flown.rotors, -1),
+      column_(given.size(), -1),
+      knots_(std::move(knots_rad)),
       mass_(mass_kg),
-      wide_(wide_rad),
       fastest_(fastest) {
+  given[kLevel] = given[kRollGain] = given[kPitchGain] = 1;
   for (std::size_t i = 0; i < free_.size(); ++i) column_[free_[i].which] = static_cast<int>(i);
   set_num_residuals(static_cast<int>(3 * bins() + free_.size() + 1));
   mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
@@ -34,12 +36,11 @@ std::vector<double> FlightModel::start() const {
   return values;
 }
 
-std::vector<double> FlightModel::all_of(const double* free) const {
-  std::vector<double> all(column_.size(), 0);
-  all[kLevel] = all[kRatio] = all[kRollGain] = all[kPitchGain] = 1;
-  all[kStamp] = stamp;
-  for (std::size_t i = 0; i < free_.size(); ++i) all[free_[i].which] = free[i];
-  return all;
+std::pair<std::size_t, double> FlightModel::place_of(double phi) const {
+  std::size_t j = 0;
+  while (j + 1 < knots_.size() && phi > knots_[j]) ++j;
+  const double before = j > 0 ? knots_[j - 1] : 0;
+  return {j, (phi - before) / (knots_[j] - before)};
 }
 
 std::vector<Rotors<double>> FlightModel::squares(const Driving& driving) const {
@@ -80,7 +81,8 @@ std::vector<Rotors<double>> FlightModel::squares(const Driving& driving) const {
 }
 
 bool FlightModel::Evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
-  const std::vector<double> p = all_of(parameters[0]);
+  std::vector<double> p = given;
+  for (std::size_t i = 0; i < free_.size(); ++i) p[free_[i].which] = parameters[0][i];
   const std::size_t n = bins(), rotors = flown_->rotors, columns = free_.size();
   const bool derive = jacobians != nullptr && jacobians[0] != nullptr;
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -111,6 +113,7 @@ bool FlightModel::Evaluate(double const* const* parameters, double* residuals, d
     if (derive && column_[which] >= 0) j(static_cast<Eigen::Index>(row), column_[which]) += slope;
   };
   const double k = hover * p[kLevel];
+  const std::size_t first_rotor = kKnots + knots_.size();
   for (std::size_t b = 0; b < n; ++b) {
     const FlownBin& bin = flown_->bins[b];
     if (shock[b]) continue;
@@ -118,13 +121,18 @@ bool FlightModel::Evaluate(double const* const* parameters, double* residuals, d
     const auto equation = [&](std::size_t row, double weight, const auto& lever, double gain, double rest) {
       double sum = 0;
       for (std::size_t i = 0; i < rotors; ++i) {
-        const double x = wide_ > 0 ? bin.phi[i] / wide_ : 0, kept = 1 - (1 - p[kRatio]) * x;
-        const double share = 1 + p[kRotors + i], of = weight * gain * lever(i) * k;
+        const double share = 1 + p[first_rotor + i], of = weight * gain * lever(i) * k;
+        double kept = 1;
+        if (!knots_.empty()) {
+          const auto [at, x] = place_of(bin.phi[i]);
+          kept = (1 - x) * (at > 0 ? p[kKnots + at - 1] : 1) + x * p[kKnots + at];
+          add(row, kKnots + at, of * share * w[b][i] * x);
+          if (at > 0) add(row, kKnots + at - 1, of * share * w[b][i] * (1 - x));
+        }
         const double thrust = of * kept * share * w[b][i];
         sum += thrust;
         add(row, kLevel, thrust / p[kLevel]);
-        add(row, kRatio, of * share * w[b][i] * x);
-        add(row, kRotors + i, of * kept * w[b][i]);
+        add(row, first_rotor + i, of * kept * w[b][i]);
         for (std::size_t d = 0; d < kDriving.size(); ++d)
           if (!dw[d].empty()) add(row, kDriving[d], of * kept * share * dw[d][b][i]);
       }
@@ -148,7 +156,7 @@ bool FlightModel::Evaluate(double const* const* parameters, double* residuals, d
           row, by, [&](std::size_t i) { return bin.levers[axis][i] + sign * p[centre]; }, per, -bin.turning[axis]);
       add(row, gain, by * turned / p[gain]);
       double thrust = 0;
-      for (std::size_t i = 0; i < rotors; ++i) thrust += k * (1 + p[kRotors + i]) * w[b][i];
+      for (std::size_t i = 0; i < rotors; ++i) thrust += k * (1 + p[first_rotor + i]) * w[b][i];
       add(row, centre, by * per * sign * thrust);
     }
   }
@@ -157,9 +165,9 @@ bool FlightModel::Evaluate(double const* const* parameters, double* residuals, d
     r[static_cast<Eigen::Index>(3 * n + i)] = (parameters[0][i] - free_[i].before) / free_[i].before_u;
     add(3 * n + i, free_[i].which, 1 / free_[i].before_u);
   }
-  for (std::size_t i = 0; i < rotors && column_[kRotors] >= 0; ++i) {
-    r[static_cast<Eigen::Index>(3 * n + columns)] += p[kRotors + i] / kMeanOfRotors;
-    add(3 * n + columns, kRotors + i, 1 / kMeanOfRotors);
+  for (std::size_t i = 0; i < rotors && column_[first_rotor] >= 0; ++i) {
+    r[static_cast<Eigen::Index>(3 * n + columns)] += p[first_rotor + i] / kMeanOfRotors;
+    add(3 * n + columns, first_rotor + i, 1 / kMeanOfRotors);
   }
   return true;
 }

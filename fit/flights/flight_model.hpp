@@ -9,16 +9,16 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fit/flights/flown_bins.hpp"
 
 namespace kphi::fit {
 
-/// Numbers of the model. Those of the rotors follow, one each.
+/// Numbers of the model. k(φ)/K_T at each knot of φ follows, then the rotors, one number each.
 enum FlightNumber : std::size_t {
   kLevel,     ///< K_T over that of steady hover
-  kRatio,     ///< k(widest φ)/K_T
   kScale,     ///< of the accelerometer, beside 1
   kBias,      ///< m/s²
   kDrag,      ///< 1/s
@@ -26,12 +26,12 @@ enum FlightNumber : std::size_t {
   kTiming,    ///< s: delay of the speeds, or lag behind the commands
   kLaw,       ///< share of u²
   kSag,       ///< relative speed per relative voltage
-  kStamp,     ///< s: by how much the stamps of the commands are late; never free, see `stamp`
+  kStamp,     ///< s: by how much the stamps of the commands are late
   kRollGain,  ///< inertia of the file over the true one
   kPitchGain,
   kCentreY,  ///< m: centre of gravity beside that of the file
   kCentreX,
-  kRotors,
+  kKnots,
 };
 
 /// A free number: what is known of it before; deviation 0: nothing.
@@ -43,8 +43,10 @@ struct FreeNumber {
 
 class FlightModel : public ceres::CostFunction {
  public:
-  /// Keeps a reference to `flown`. `wide_rad` is the φ of kRatio, 0: none; `fastest` the speed at full command, rad/s.
-  FlightModel(const FlownBins& flown, std::vector<FreeNumber> free, double mass_kg, double wide_rad, double fastest);
+  /// Keeps a reference to `flown`. k(φ)/K_T is straight from 1 at φ = 0 through the knots, ascending, and on beyond;
+  /// without any it is 1. `fastest` is the speed at full command, rad/s.
+  FlightModel(const FlownBins& flown, std::vector<FreeNumber> free, std::vector<double> knots_rad, double mass_kg,
+              double fastest);
 
   /// What turns the rotors: kTiming, kLaw, kSag, kStamp.
   static constexpr std::array kDriving{kTiming, kLaw, kSag, kStamp};
@@ -55,8 +57,8 @@ class FlightModel : public ceres::CostFunction {
   [[nodiscard]] const std::vector<FreeNumber>& free() const { return free_; }
   [[nodiscard]] std::vector<double> start() const;
 
-  double stamp = 0;  ///< s: kStamp. A fit would tell it from the lag by what the model has only nearly right
-  double hover = 1;  ///< K_T where kLevel is 1, N/(rad/s)²
+  std::vector<double> given;  ///< all numbers, of which those that are not free count
+  double hover = 1;           ///< K_T where kLevel is 1, N/(rad/s)²
   /// Standard deviations of a residual of force [m/s²], roll and pitch [rad/s²] by which they are weighted.
   std::array<double, 3> sigma{0.5, 10, 10};
   std::vector<char> shock;  ///< one for each bin: its force does not count
@@ -66,11 +68,14 @@ class FlightModel : public ceres::CostFunction {
   [[nodiscard]] std::size_t bins() const { return flown_->bins.size(); }
 
  private:
-  [[nodiscard]] std::vector<double> all_of(const double* free) const;
+  /// Of a rotor at φ: its knot at or beyond φ, the last one at most, and the share of the way there from the one
+  /// before.
+  [[nodiscard]] std::pair<std::size_t, double> place_of(double phi) const;
   const FlownBins* flown_;
   std::vector<FreeNumber> free_;
   std::vector<int> column_;  // of each number, −1: not free
-  double mass_, wide_, fastest_;
+  std::vector<double> knots_;
+  double mass_, fastest_;
 };
 
 }  // namespace kphi::fit

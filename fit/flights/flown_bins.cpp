@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
+#include <utility>
 
 #include "base/error.hpp"
 #include "base/statistics.hpp"
@@ -20,6 +22,10 @@ using compensation::Rotors;
 constexpr double kNotLogged = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEarth = 9.80665;
 constexpr double kLeastSeconds = 20;
+constexpr double kOpen = 5;          // degrees of φ, below which a rotor counts as open
+constexpr double kGapOfShapes = 3;   // degrees of φ
+constexpr double kLeastShape = 3;    // s in one shape
+constexpr double kPieceOfShape = 6;  // s
 
 bool known(const FlightChannel& channel) { return channel.time_s.size() > 1; }
 
@@ -228,6 +234,7 @@ class Cutter {
     const double ground = lying.empty() ? 0 : median(lying);
 
     std::vector<FlownBin> bins(count);
+    std::vector<std::array<double, 2>> across(count);
     std::vector<char> usable(count, 1), flies(count, 0);
     for (std::size_t b = 0; b < count; ++b) {
       const double from = begin_ + static_cast<double>(b) * width, to = from + width;
@@ -237,7 +244,7 @@ class Cutter {
       std::array<double, 3> felt{};
       for (std::size_t axis = 0; axis < 3; ++axis) felt[axis] = force[axis].mean(from, to, gap);
       bin.force = felt[2];
-      bin.forward = felt[0] * felt[0] + felt[1] * felt[1];
+      across[b] = {felt[0], felt[1]};
       flies[b] = sum > 0.3 * usual ? 1 : 0;
       const auto leave_out = [&](std::size_t LeftOutBins::*why) {
         if (usable[b]) ++(flown_.left_out.*why);
@@ -256,7 +263,7 @@ class Cutter {
         turning = turning || std::abs(then[i].value() - before) > 0.05;
       }
       const bool arms_known = std::ranges::all_of(now, [](Radians arm) { return std::isfinite(arm.value()); });
-      if (!std::isfinite(sum + bin.force + bin.forward) || !arms_known) {
+      if (!std::isfinite(sum + felt[0] + felt[1] + felt[2]) || !arms_known) {
         leave_out(&LeftOutBins::unknown);
         continue;
       }
@@ -288,12 +295,28 @@ class Cutter {
         bin.turns = std::isfinite(bin.turning[0] + bin.turning[1]);
       }
     }
+    take_forward(across, bins);
     leave_out_ends(bins, usable, flies);
     if (!flown_.climb_logged) integrate_climb(bins, usable);
     for (std::size_t b = 0; b < count; ++b) {
       if (!usable[b]) continue;
       flown_.bins.push_back(bins[b]);
       flown_.first.push_back(b * flown_.samples);
+    }
+  }
+
+  /// Vibration is left out: what the air does across lasts longer.
+  void take_forward(const std::vector<std::array<double, 2>>& across, std::vector<FlownBin>& bins) const {
+    const auto wide = static_cast<std::ptrdiff_t>(0.5 / flown_.width_s),
+               size = static_cast<std::ptrdiff_t>(bins.size());
+    for (std::ptrdiff_t b = 0; b < size; ++b) {
+      std::array<double, 2> sum{};
+      double count = 0;
+      for (std::ptrdiff_t at = std::max<std::ptrdiff_t>(0, b - wide); at <= std::min(size - 1, b + wide); ++at) {
+        const auto& [x, y] = across[static_cast<std::size_t>(at)];
+        if (std::isfinite(x + y)) sum[0] += x, sum[1] += y, ++count;
+      }
+      bins[static_cast<std::size_t>(b)].forward = (square(sum[0]) + square(sum[1])) / square(std::max(1.0, count));
     }
   }
 
@@ -402,6 +425,65 @@ class Cutter {
       excitation.folds += is != folded ? 1 : 0;
       folded = is;
     }
+    take_knots();
+  }
+
+  /// Bins by their widest φ, degrees.
+  using ByPhi = std::vector<std::pair<double, const FlownBin*>>;
+
+  /// Long and often enough to tell a k, also where a piece of the flight is left out.
+  [[nodiscard]] bool enough(ByPhi::const_iterator from, ByPhi::const_iterator to) const {
+    std::set<int> pieces;
+    for (auto one = from; one != to; ++one) pieces.insert(static_cast<int>(one->second->time_s / kPieceOfShape));
+    return static_cast<double>(to - from) * flown_.width_s >= kLeastShape && pieces.size() >= 3;
+  }
+
+  /// Shapes are told by gaps in φ; where the arms went slowly through many, knots are some 15° apart.
+  void take_knots() {
+    ByPhi all;
+    for (const FlownBin& bin : flown_.bins) all.emplace_back(*std::ranges::max_element(bin.phi) * 180 / kPi, &bin);
+    std::ranges::sort(all);
+    const auto at_least = [&](double phi) {
+      return std::ranges::lower_bound(all, phi, {}, [](const auto& one) { return one.first; });
+    };
+    std::vector<double>& knots = flown_.excitation.knots_deg;
+    const auto knot = [&](double phi) { knots.push_back(std::round(10 * phi) / 10); };  // as files and people name it
+    const auto open = at_least(kOpen);
+    for (auto from = open; from != all.cend();) {
+      auto to = from + 1;
+      while (to != all.cend() && to->first - (to - 1)->first < kGapOfShapes) ++to;
+      const double first = from->first, span = (to - 1)->first - first;
+      const double last = to == all.cend() ? flown_.excitation.widest_deg : (to - 1)->first;
+      if (enough(from, to) && span < 8) {
+        knot(to == all.cend() ? last : (from + (to - from) / 2)->first);
+      } else if (enough(from, to)) {
+        const double parts = std::clamp(std::round(span / 15), 1.0, 5.0), part = (last - first) / parts;
+        if (first > 2 * kOpen) knot(first);
+        for (double i = 1; i <= parts; ++i)
+          if (i == parts || enough(at_least(first + (i - 1) * part), at_least(first + i * part)))
+            knot(first + i * part);
+      }
+      from = to;
+    }
+    const bool is_open = enough(all.cbegin(), open);
+    if (!is_open && knots.size() < 2)
+      throw FitError(
+          fmt::format("rotors lay over the body nearly all the time (φ {:.0f}° at most): that tells k there and not "
+                      "K_T; fly the open shape, too, for 20 s in three pieces",
+                      flown_.excitation.widest_deg));
+    // Two shapes that both cover rotors tell a line through both, and K_T where it begins.
+    if (!is_open) knots.erase(knots.begin());
+    if (!knots.empty()) return;
+    flown_.left_out.folded = static_cast<std::size_t>(all.cend() - open);
+    std::size_t kept = 0;
+    for (std::size_t b = 0; b < flown_.bins.size(); ++b) {
+      if (!(*std::ranges::max_element(flown_.bins[b].phi) * 180 / kPi < kOpen)) continue;
+      flown_.bins[kept] = flown_.bins[b];
+      flown_.first[kept++] = flown_.first[b];
+    }
+    flown_.bins.resize(kept);
+    flown_.first.resize(kept);
+    flown_.excitation.seconds = static_cast<double>(kept) * flown_.width_s;
   }
 
   const FlightLog& log_;

@@ -26,24 +26,25 @@ struct LoggedVehicle {
   std::optional<compensation::Rotors<compensation::HubPosition>> hubs{};
   double mass_kg = 0;     ///< of all of it as it flew, with battery
   double mass_u = 0.003;  ///< standard uncertainty, relative
+  bool weighed = false;   ///< the mass is of this flight, not of the vehicle file
   std::string shape{};    ///< name of `arms` or `hubs`, for messages
 };
 
 struct FlownBin {
-  double time_s = 0;                   ///< of its middle
-  double force = 0;                    ///< specific force along body z, m/s²
-  double forward = 0;                  ///< squares of the other two, (m/s²)²: grows with the speed over ground
-  double climb = 0;                    ///< m/s along body z, or what takes its place
-  std::array<double, 2> turning{};     ///< roll and pitch acceleration, rad/s²; where `turns`
-  bool turns = false;                  ///< no rotor is over the body, and the angular rates are known
-  compensation::Rotors<double> phi{};  ///< rad
+  double time_s = 0;   ///< of its middle
+  double force = 0;    ///< specific force along body z, m/s²
+  double forward = 0;  ///< squares of the other two, means over 1 s, (m/s²)²: grows with the speed through the air
+  double climb = 0;    ///< m/s along body z, or what takes its place
+  std::array<double, 2> turning{};                       ///< roll and pitch acceleration, rad/s²; where `turns`
+  bool turns = false;                                    ///< no rotor is over the body, and the angular rates are known
+  compensation::Rotors<double> phi{};                    ///< rad
   std::array<compensation::Rotors<double>, 2> levers{};  ///< y_i and −x_i about the centre of gravity, m
   std::array<double, 2> inertia{};                       ///< about x and y, kg m²
 };
 
 /// Why bins were left out, and how many.
 struct LeftOutBins {
-  std::size_t on_ground = 0, near_ground = 0, arms_turning = 0, unknown = 0, sinking = 0, shocks = 0;
+  std::size_t on_ground = 0, near_ground = 0, arms_turning = 0, unknown = 0, sinking = 0, folded = 0;
 };
 
 /// What the flight did, which limits what it can tell.
@@ -54,6 +55,8 @@ struct Excitation {
   double widest_deg = 0;      ///< largest φ at which a second was flown
   double seconds_folded = 0;  ///< at more than half of it
   int folds = 0;              ///< how often the arms changed between folded and not
+  /// φ of the shapes that were flown long and often enough to tell k there, ascending; empty: K_T alone.
+  std::vector<double> knots_deg{};
 };
 
 /// Even samples of what drives the rotors: speeds [rad/s] or commands.

@@ -29,7 +29,9 @@ constexpr Magic kMagics[]{
      "7zXZ",
      "compressed by xz; `unxz -k FILE` and import what it gives"},
     {"\x28\xB5\x2F\xFD", "compressed by zstd; `unzstd FILE` and import what it gives"},
-    {"ULog\x01\x12\x35", "a flight log of PX4 (ULog), which has no measured thrust; kphi imports tables of a stand"},
+    {"ULog\x01\x12\x35", "a flight log of PX4 (ULog); use `kphi fit FLIGHT --vehicle VEHICLE`"},
+    {"\xBC\x01", "a flight log of a Crazyflie (card log); use `kphi fit FLIGHT --vehicle VEHICLE`"},
+    {"\xBC\x02", "a flight log of a Crazyflie (card log); use `kphi fit FLIGHT --vehicle VEHICLE`"},
     {"\x89HDF\r\n",
      "an HDF5 file; a run of kphi is read by `kphi info`, a table in another one is exported with "
      "h5dump or h5py as CSV"},
@@ -38,9 +40,8 @@ constexpr Magic kMagics[]{
     {"SQLite format 3", "an SQLite database; write its table as CSV (sqlite3 -csv) and import that"},
     {"%PDF", "a PDF; export the table from the program that made it as CSV"},
     {"H Product:Blackbox",
-     "a blackbox log of Betaflight; a flight is read from what `blackbox_decode` makes of it, and kphi import takes "
-     "tables "
-     "of a stand"}};
+     "a flight log of Betaflight (blackbox); decode it with `blackbox_decode`, then use `kphi fit FLIGHT.csv --layout "
+     "LAYOUT --vehicle VEHICLE`"}};
 
 }  // namespace
 

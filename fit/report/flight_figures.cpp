@@ -98,7 +98,7 @@ Figure curves(const FlightFit& fit, const Fitted& fitted, const compensation::Co
   for (const CurveBand& one : fitted.analysis.band) add(rows, "flight", one.phi_deg, one.k, one.expanded);
   if (bench != nullptr) {
     for (int i = 0; i <= 40; ++i) {
-      const double phi = fit.wide_deg * i / 40;
+      const double phi = fit.wide_deg() * i / 40;
       const double u = bench->curve.standard_error_at(from_degrees(phi));
       add(beside, "bench", phi, bench->curve.at(from_degrees(phi)).value(), std::isfinite(u) ? 1.96 * u : 0);
     }

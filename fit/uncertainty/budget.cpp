@@ -14,7 +14,7 @@
 namespace kphi::fit {
 namespace {
 
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 /// Share of a variance that rounding leaves of errors that cancel.
 constexpr double kVanishing = 1e-12;
@@ -23,8 +23,8 @@ struct Entry {
   const char* name;
   std::optional<double> BenchUncertainty::*member;
   double unit;
-  double assumed = kUnknown;  ///< where nobody measured it, in `unit`
-  const char* why = "";       ///< that much
+  double assumed = kNotKnown;  ///< where nobody measured it, in `unit`
+  const char* why = "";        ///< that much
   const char* remedy = "";
 };
 
@@ -102,7 +102,7 @@ ErrorSource mounting_of(const Repeatability& all) {
                                             : "as given: each occlusion was mounted once for all its runs"};
   mounting.assumed = all.mounting_assumed;
   mounting.remedy = kRemount;
-  for (const AngleScatter& angle : all.angles) mounting.effects.push_back({all.mounting.value_or(kUnknown), angle.k});
+  for (const AngleScatter& angle : all.angles) mounting.effects.push_back({all.mounting.value_or(kNotKnown), angle.k});
   return mounting;
 }
 
@@ -238,7 +238,7 @@ ErrorSources error_sources(const Repeatability& repeatability, std::span<const S
 
 ErrorSources error_sources(std::vector<double> k, const std::vector<double>& standard_errors) {
   ErrorSource source{"given standard error", Evaluation::type_b, kUnitOfK};
-  for (const double error : standard_errors) source.effects.push_back({error > 0 ? error : kUnknown, 1});
+  for (const double error : standard_errors) source.effects.push_back({error > 0 ? error : kNotKnown, 1});
   return {std::move(k), {std::move(source)}};
 }
 

@@ -77,9 +77,9 @@ TEST(FlightsOfKphiFly, TellTheirWorld) {
     EXPECT_LT(std::abs(fit.k_t - k_t), 1.5 * 1.96 * fit.k_t_u) << name << ": " << fit.k_t / k_t;
     ASSERT_FALSE(fit.alone()) << name;
     const double truth = true_ratio(rows);
-    EXPECT_LT(std::abs(fit.ratio.value - truth), 0.01)
-        << name << ": " << fit.ratio.value << " for " << truth << ", u " << fit.ratio.u;
-    EXPECT_LT(std::abs(fit.ratio.value - truth), 1.5 * expanded(fit.ratio)) << name;
+    EXPECT_LT(std::abs(fit.ratio().value - truth), 0.01)
+        << name << ": " << fit.ratio().value << " for " << truth << ", u " << fit.ratio().u;
+    EXPECT_LT(std::abs(fit.ratio().value - truth), 1.5 * expanded(fit.ratio())) << name;
     EXPECT_FALSE(fit.rotors_told) << "without angular rates";
   }
 }

@@ -35,6 +35,7 @@ struct Truth {
   double law = 0.6;                         ///< share of u² in the law of throttle
   double mass_kg = 0.6;                     ///< of the drone as it flew
   double told_kg = 0.6;                     ///< of the drone as it was weighed
+  double told_speed = 1;                    ///< of the speeds as logged, over the true ones
   int weak = -1;                            ///< rotor with a damaged propeller
   double weakness = 0;                      ///< share of its thrust
   std::array<double, 4> share{1, 1, 1, 1};  ///< of each rotor, of the mean
@@ -52,6 +53,7 @@ struct Settings {
          speed_u = 0.002;  ///< standard deviations that are drawn
   double weakness = 0.05;
   double excitation = 1;  ///< of steps in place, height and yaw
+  double shake = 1;       ///< of the vibration
   bool with_climb = true, with_height = true;
 };
 
@@ -116,10 +118,11 @@ class Drone {
     side_drag_ = 0.3 + 0.1 * random_.symmetric();
     const double gust = 0.15 + 0.1 * random_.symmetric();
     wind_ = {Wander{gust, 1.5}, Wander{gust, 1.5}, Wander{0.5 * gust, 1.0}};
-    shake_ = 0.8 + 0.6 * random_.symmetric();
+    shake_ = settings.shake * (0.8 + 0.6 * random_.symmetric());
     sag_ = kind == Kind::commands ? 0.5 + 0.5 * random_.symmetric() : 0;
     full_ = kFull * (1 + settings.full_u * random_.normal());
     speed_off_ = settings.speed_u * random_.normal();
+    truth_.told_speed = 1 + speed_off_;
     stamp_s_ = 0.001 * random_.normal();  // the task that stamps commands is not that of the accelerometer
     offset_s_ = 0.008 + 0.007 * random_.symmetric();
     constexpr std::array steps{1, 2, 5};  // 500, 250, 100 Hz

@@ -412,11 +412,14 @@ TEST(Times, OfAClockAreSeconds) {
 }
 
 TEST(OtherFiles, AreNamedWithWhatToDo) {
-  for (const auto& [bytes, words] : {std::pair<std::string, const char*>{"PK\x03\x04zzzz", "Excel workbook"},
-                                     {"\x1F\x8B\x08zz", "gunzip -k FILE"},
-                                     {std::string("ULog\x01\x12\x35", 7), "flight log of PX4"},
-                                     {"\x89HDF\r\n\x1A\n", "h5dump"},
-                                     {"PAR1zz", "Parquet"}})
+  for (const auto& [bytes, words] :
+       {std::pair<std::string, const char*>{"PK\x03\x04zzzz", "Excel workbook"},
+        {"\x1F\x8B\x08zz", "gunzip -k FILE"},
+        {std::string("ULog\x01\x12\x35", 7), "flight log of PX4 (ULog); use `kphi fit FLIGHT --vehicle VEHICLE`"},
+        {std::string("\xBC\x01\x00\x02", 4), "flight log of a Crazyflie"},
+        {"H Product:Blackbox flight data", "decode it with `blackbox_decode`"},
+        {"\x89HDF\r\n\x1A\n", "h5dump"},
+        {"PAR1zz", "Parquet"}})
     EXPECT_THAT(refusal(bytes), HasSubstr(words));
 }
 
