@@ -9,8 +9,7 @@ import path from 'node:path';
 import { Bench, Child } from './bench.mjs';
 
 const [kphi, modules, pictures] = process.argv.slice(2);
-const kSkipped = 77, kInterrupted = 130;
-const kRate_hz = 20, kPrompt_ms = 200;
+const kSkipped = 77, kInterrupted = 130, kRate_hz = 20, kPrompt_ms = 200;
 
 function skip(why) {
   console.log(`SKIPPED: ${why}`);
@@ -79,6 +78,7 @@ async function open(browser, url, more = {}) {
 }
 
 const kReadings = ['thrust', 'speed', 'run', 'occlusion', 'repetition', 'step', 'left', 'supply', 'module', 'coil', 'drive', 'vibration', 'received', 'lost'];
+const kWidest = { run: '10/20', repetition: '10/20', supply: '12.00 V · 17.53 A · 210 W', module: '12.00 V · 17.53 A · 210 W', drive: 'derates to 95 %', vibration: '0.26 N · 0.12 N at 916 Hz', received: '9 187 500', lost: '12 345, 0' };
 const readings = page => page.evaluate(ids => Object.fromEntries(ids.map(id => [id, at(id).textContent])), kReadings);
 
 /// Numbers of each axis that is shown are such as a person writes, and no two of them alike.
@@ -136,8 +136,7 @@ try {
   const launched = playwright.chromium.launch({ executablePath: browserAt, args: ['--no-sandbox', '--disable-gpu', '--disable-features=LocalNetworkAccessChecks'] });
   const run = bench.run('--live');
   browser = await launched;
-  const url = await addressOf(run);
-  const origin = new URL(url).origin;
+  const url = await addressOf(run), { origin } = new URL(url);
   const page = await open(browser, url);
 
   await it(`updates at ${kRate_hz} Hz or more`, async () => {
@@ -247,9 +246,10 @@ try {
     assert.deepEqual(shown, ['–', '0', 'off', 'no power', '45°', '2/20', '7/20', 'waiting']);
     assert.ok(await page.locator('#plate .plate').isVisible(), 'the plate is drawn');
     assert.equal(await page.locator('#speed_card').isHidden(), true);
+    for (const colorScheme of ['dark', 'light']) await page.emulateMedia({ colorScheme });  // charts are made again
     await page.evaluate(() => take.ask({ text: '', occlusion_deg: 0, repetition: 0, run: 0, has_power: true, drawing: '' }));
-    assert.equal(await page.locator('#banner').isHidden(), true);
-    assert.equal(await page.locator('#plate_card').isHidden(), true);
+    for (const id of ['#banner', '#plate_card']) assert.equal(await page.locator(id).isHidden(), true);
+    await page.waitForFunction(() => Object.values(charts).every(chart => chart.size().width === at('k_chart').clientWidth));
     await turns(page, run, 1);
     await page.waitForFunction(() => document.title.startsWith('turning – '));
     assert.match(await page.locator('#run').innerText(), /^\d+\/20$/);
@@ -269,7 +269,7 @@ try {
     await page.mouse.move(x + 0.6 * width, y + 0.5 * height);
     await page.waitForFunction(() => / s: .* N/.test(at('thrust_read').textContent));
     assert.doesNotMatch(await page.locator('#thrust_read').innerText(), /NaN/);
-    const words = await page.evaluate(() => { text('run', '10/20'); text('repetition', '10/20'); return [...document.querySelectorAll('#where p, h2')].filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1).map(node => node.textContent); });
+    const words = await page.evaluate(widest => { Object.entries(widest).forEach(each => text(...each)); return [...document.querySelectorAll('#where p, h2, #readings dd')].filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1).map(node => node.textContent).concat([...document.querySelectorAll('#readings dt')].filter((node, _, all) => node.offsetTop !== all[0].offsetTop).map(node => `${node.textContent} in a second row`)); }, kWidest);
     assert.deepEqual(words, [], 'words that do not fit');
     await page.mouse.down();
     await page.mouse.move(x + 0.9 * width, y + 0.5 * height, { steps: 5 });
@@ -291,8 +291,8 @@ try {
   await it('fits a telephone', async () => {
     const phone = await open(browser, url, { viewport: { width: 390, height: 844 } });
     await phone.waitForFunction(() => state.trace.length > 20);
-    const cut = await phone.evaluate(() => [document.documentElement.scrollWidth, ...[...document.querySelectorAll('#where b, #where span, .number, header *')]
-      .filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1 && getComputedStyle(node).display !== 'inline').map(node => node.textContent)]);
+    const cut = await phone.evaluate(widest => [Object.entries(widest).forEach(each => text(...each)), document.documentElement.scrollWidth,
+      ...[...document.querySelectorAll('#where b, #where span, .number, header *, #readings dd')].filter(node => node.offsetParent && node.scrollWidth > node.clientWidth + 1 && getComputedStyle(node).display !== 'inline').map(node => node.textContent)].slice(1), kWidest);
     assert.deepEqual(cut, [390]);
     await phone.screenshot({ path: path.join(pictures, 'live_view_phone.png'), fullPage: true });
     await phone.close();

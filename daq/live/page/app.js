@@ -10,7 +10,6 @@ const kAtRest_rpm = 96;    // slower: at rest, as for the drivers: 10 rad/s
 
 const kMostGhost = 20000;  // points of one run
 const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
-
 const state = { hello: null, limits: [], tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
                 numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: null, well: true, held: {},
                 run: null, before: new Map() };
@@ -87,6 +86,7 @@ function makeCharts() {
     labels: ['x', 'k'], strokeWidth: 0, drawPoints: true, dateWindow: rpm, valueRange: [0, 2],
     pointSize: 5, drawPointCallback: drawStep,
     axes: { x: { axisLabelFormatter: thousands }, y: { axisLabelWidth: 62, axisLabelFormatter: axisOf(2) } } });
+  for (const place of document.querySelectorAll('.chart')) place.style.width = place.style.height = '';  // set by a chart made while hidden
   state.chartsDue = state.stepsDue = true;
 }
 
@@ -181,8 +181,8 @@ function showNumbers() {
   text('occlusion', fixed(next.occlusion_deg, 0) + '°');
   text('repetition', `${next.repetition}/${Math.max(next.repetition, tick.repetitions)}`);
   const waits = state.question !== null || (tick.silent_s > kSilent_s && !state.ended);
-  text('step', waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
-  text('step_word', waits ? '' : turns ? 'step' : '');
+  text('step', state.ended ? '–' : waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
+  text('step_word', state.ended || (turns && !waits) ? 'step' : '');
   text('left', clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
