@@ -44,7 +44,7 @@ void write_log(const fs::path& path, std::size_t rows) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::size_t rows = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 5'000'000;
+  const std::size_t rows = argc > 1 && std::atoi(argv[1]) > 0 ? std::strtoul(argv[1], nullptr, 10) : 5'000'000;
   const int pairs = argc > 2 ? std::atoi(argv[2]) : 3;
   const fs::path folder = fs::temp_directory_path() / fmt::format("kphi_import_bench_{}", getpid());
   fs::create_directories(folder);
