@@ -14,7 +14,7 @@ struct Room {
   std::vector<std::string_view> sees;
 };
 
-/// Nobody sees a module that stands later: no arrow runs up, and there is no circle.
+/// A module includes only modules that stand before it, so no includes form a circle.
 inline const std::vector<Room>& rooms() {
   static const std::vector<Room> kRooms{
       {"base", {}},
