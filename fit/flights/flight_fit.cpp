@@ -301,8 +301,7 @@ class Fitting {
     };
     for (const auto& [name, covariance] : groups)
       add(name, Evaluation::type_b, covariance, {}, "what is known of it without the flight",
-          name.starts_with("accelerometer") ? "lay the vehicle on six sides for zero and scale (--u bias=, --u scale=)"
-                                            : "");
+          name == group_of(kScale) || name == group_of(kBias) ? "lay it on six sides (--u bias=, --u scale=)" : "");
     shared("mass", vehicle_.mass_u, fmt::format("{:g} kg to {:g} %", vehicle_.mass_kg, 100 * vehicle_.mass_u),
            "weigh the vehicle with its battery (--mass, --u mass=)");
     if (flown_.drive.commands)
