@@ -307,6 +307,7 @@ void Guard::check(bool spinning) {
 Observation Guard::observe(Instant now) const {
   Observation seen = daq::observe(shown_.read(), now, fresh_, bench_.clock());
   seen.judged[Watched::pause] = pause_s_;
+  if (!judging_) seen.judged[Watched::speed_error] = kUnknown;
   if (spinning_) seen.judged[Watched::recorder_pause] = wall_seconds_since(recorded_ns_, now);
   seen.account = bench_.load_cell().account();
   return seen;

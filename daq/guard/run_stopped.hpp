@@ -25,6 +25,7 @@ struct StopWords {
   std::string data{};          ///< where the data are, and how to continue; empty if nothing was recorded
   std::string state{};         ///< of motor and supply; empty if neither was switched on
   MotorFailure motor_failure = MotorFailure::none;
+  bool at_rest = false;  ///< the rotor was seen at rest, or has not turned
 
   /// Adds a further report to the consequences; an empty one is ignored.
   void also(const std::string& text);

@@ -90,8 +90,8 @@ std::unique_ptr<Progress> LiveSession::beside(Progress& behind, const Clock& clo
   return std::make_unique<LiveProgress>(behind, feed_, plotter_.get(), subject_, clock);
 }
 
-void LiveSession::end(bool well, const std::string& words) {
-  feed_.tell(end_message(clock_ != nullptr ? to_seconds(clock_->now()) : 0, well, words));
+void LiveSession::end(bool well, bool at_rest, const std::string& words) {
+  feed_.tell(end_message(clock_ != nullptr ? to_seconds(clock_->now()) : 0, well, at_rest, words));
 }
 
 }  // namespace kphi::daq::live

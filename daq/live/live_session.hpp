@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "daq/guard/run_stopped.hpp"
 #include "daq/live/feed.hpp"
 #include "daq/live/messages.hpp"
 #include "daq/live/server.hpp"
@@ -82,16 +83,16 @@ class LiveSession {
   auto tell_the_end(Work&& work, const std::string& words = "finished") {
     try {
       auto result = work();
-      end(true, words);
+      end(true, !subject_.replay, words);
       return result;
     } catch (const std::exception& e) {
-      end(false, e.what());
+      end(false, words_of(std::current_exception()).at_rest, e.what());
       throw;
     }
   }
 
  private:
-  void end(bool well, const std::string& words);
+  void end(bool well, bool at_rest, const std::string& words);
 
   Subject subject_;
   Feed feed_;

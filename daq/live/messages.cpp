@@ -113,8 +113,9 @@ Message ask_message(const StandQuestion& question) {
 
 Message stop_message(double time_s) { return {Message::Kind::other, text_of({{"type", "stop"}, {"time_s", time_s}})}; }
 
-Message end_message(double time_s, bool well, const std::string& text) {
-  return {Message::Kind::other, text_of({{"type", "end"}, {"time_s", time_s}, {"well", well}, {"text", text}})};
+Message end_message(double time_s, bool well, bool at_rest, const std::string& text) {
+  return {Message::Kind::other,
+          text_of({{"type", "end"}, {"time_s", time_s}, {"well", well}, {"at_rest", at_rest}, {"text", text}})};
 }
 
 std::string plot_message(const Tick& tick, const std::vector<GuardLimit>& limits) {

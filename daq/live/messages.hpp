@@ -19,7 +19,7 @@
 //            off), drawing (SVG of what is to be mounted, or "")
 //   reached  what the campaign knows so far: text
 //   stop     STOP was pressed on a page: time_s
-//   end      the run is over: time_s, well (bool), text
+//   end      the run is over: time_s, well (bool), at_rest (bool: the rotor was seen at rest, or has not turned), text
 //
 // A page sends "stop"; where the motor is turned by hand also "up", "down", "hold"; where a mass is weighed "hold".
 #pragma once
@@ -106,7 +106,7 @@ struct Message {
 [[nodiscard]] Message ask_message(const StandQuestion& question);
 [[nodiscard]] Message reached_message(const std::string& text);
 [[nodiscard]] Message stop_message(double time_s);
-[[nodiscard]] Message end_message(double time_s, bool well, const std::string& text);
+[[nodiscard]] Message end_message(double time_s, bool well, bool at_rest, const std::string& text);
 
 /// For plotters (PlotJuggler's UDP server): `timestamp` in seconds since 1970; only numbers, none that is unknown;
 /// limit_share {key: 1 at the limit, …}; fewer than 1400 bytes.

@@ -23,9 +23,9 @@ using results::Phase;
 constexpr Duration kTickWall = std::chrono::milliseconds(10);
 constexpr double kHandSlew = 200;  // rad/s², where the campaign sets none
 constexpr double kEndRamp = 1000;  // rad/s², on a supply that sinks what it feeds back
-constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);  // samples in transit still carry the old zero
-constexpr Duration kExplanationWall = std::chrono::seconds(3);       // the box is asked over HTTP for 2 s
-constexpr Duration kAftermath = std::chrono::seconds(3);
+constexpr Duration kBiasWorksWall = std::chrono::milliseconds(100);    // samples in transit still carry the old zero
+constexpr Duration kExplanationWall = std::chrono::seconds(3);         // the box is asked over HTTP for 2 s
+constexpr Duration kAftermath = std::chrono::seconds(6);               // a rotor of a few inches is at rest after three
 constexpr Duration kLastReadingWall = std::chrono::milliseconds(500);  // of a supply whose output is off
 constexpr int kBiasAttempts = 3;
 constexpr int kEventsShown = 10;
@@ -86,8 +86,13 @@ void Sequence::add_aftermath(StopWords& words) {
 
 void Sequence::watch_the_coast(StopWords& words) {
   const auto add = [&](const std::string& what) { words.leaves("motor: " + what); };
+  const auto add_stop = [&](const iq::StopReport& stop) {
+    words.at_rest = stop.outcome == iq::StopReport::Outcome::standing;
+    add(stop.summary());
+  };
+  words.at_rest = !has_spun_;
   if (!has_spun_) return add("was not turning");
-  if (stop_) return add(stop_->summary());
+  if (stop_) return add_stop(*stop_);
   iq::StopSettings settings;
   settings.limit = kAftermath;
   bench_.motor().begin_stop(settings);
@@ -102,7 +107,7 @@ void Sequence::watch_the_coast(StopWords& words) {
     if (!stop_) bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
     show_coast();
   }
-  add((stop_ ? *stop_ : iq::StopReport{}).summary());
+  add_stop(stop_ ? *stop_ : iq::StopReport{});
 }
 
 /// What is left of the speed, for whoever pressed STOP.
@@ -127,6 +132,7 @@ void Sequence::switch_off(StopWords& words) {
   const auto newest = [this] { return guard_.observe(bench_.clock().now()).supply; };
   while (newest().time_ns < since.count() && bench_.clock().now() < give_up)
     bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
+  words.at_rest = !has_spun_;
   words.state = has_spun_ ? "motor: ordered to coast, now without power; supply: output off"
                           : "motor: was not turning; supply: output off";
   const SupplyReading seen = newest();

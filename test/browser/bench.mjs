@@ -42,7 +42,7 @@ name: browser
 propeller: {id: 5x3, name: 5-inch three-blade, diameter_in: 5, blades: 3}
 occlusions_deg: [90]
 repetitions: 20
-profile: {steps: 3, dwell_s: 0.7, first_rpm: 6000, last_rpm: 12000}
+profile: {steps: 3, dwell_s: 1.2, first_rpm: 6000, last_rpm: 12000}
 zero_s: 0.3
 minimum_discard_s: 0.25
 supply_v: 12.0

@@ -11,7 +11,7 @@ const kAtRest_rpm = 96;    // slower: at rest, as for the drivers: 10 rad/s
 const kMostGhost = 20000;  // points of one run
 const kNearGhost_s = 1.5;  // of bench time: the simulated one may be fast
 const state = { hello: null, limits: [], tick: null, trace: [], steps: [], ended: false, asked: false, drawn: 0, cost: 0,
-                numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: null, well: true, held: {},
+                numbersDue: false, chartsDue: false, stepsDue: false, curve: 'thrust', question: null, well: true, atRest: false, held: {},
                 run: null, before: new Map() };
 
 /// What the lower chart can show: unit, and the value of a tick.
@@ -204,7 +204,7 @@ function showFigure(id, value, words, age_s, beside, none = '') {
   const silent_s = Math.max(age_s, state.tick.silent_s), asked = state.question !== null && !state.ended;
   const stale = !asked && !none && (value === null || state.tick.silent_s > kSilent_s);
   text(id, state.ended || none ? '–' : asked ? (id === 'speed' ? '0' : '–') : stale ? '?' : words(value));
-  const rest = id !== 'speed' || value === null ? '' : value > kAtRest_rpm ? ', not seen at rest' : ', at rest';
+  const rest = id !== 'speed' || value === null ? '' : value <= kAtRest_rpm ? ', at rest' : state.atRest ? ', then at rest' : ', not seen at rest';
   text(id + '_beside', state.ended ? `last value ${words(value)}${rest}` : asked ? (id === 'speed' ? 'at rest' : 'not measured now')
     : none || (stale ? `no reading for ${fixed(silent_s, 1)} s` : beside));
   at(id).closest('.figure').classList.toggle('stale', stale && !state.ended);
@@ -409,12 +409,13 @@ const take = {
     addLine(message.time_s, message.text);
     const { replay, by_hand, weighs } = state.hello;
     state.well = message.well;
+    state.atRest = message.at_rest;
     state.question = null;
     showPlate();
     showTitle();
     if (!message.well) alarm();
     const well = replay ? 'The replay is over.' : weighs ? 'Weighed.' : by_hand ? 'The motor is at rest.' : 'Campaign finished.';
-    banner(message.well || state.asked ? 'good' : 'bad', message.well ? well : state.asked ? 'Stopped as asked.' : 'The run is over.', message.well ? (weighs ? message.text : '') : message.text);
+    banner(message.well || (state.asked && message.at_rest) ? 'good' : state.asked ? '' : 'bad', message.well ? well : state.asked ? 'Stopped as asked.' : 'The run is over.', message.well ? (weighs ? message.text : '') : message.text);
     showStop();
   },
 };

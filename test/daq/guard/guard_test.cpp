@@ -380,6 +380,8 @@ TEST_F(GuardAlone, StandsDownWhenTheRunIsOver) {
   guard_.take_zero({});
   samples(30, 100);
   expect_no_trip();
+  EXPECT_TRUE(std::isnan(guard_.observe(bench_.time.now()).judged[Watched::speed_error]))
+      << "a coasting rotor has no wanted speed";
 }
 
 }  // namespace guard_test

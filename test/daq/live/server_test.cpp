@@ -386,10 +386,11 @@ TEST_F(LiveServer, DeliversTheLastWordsBeforeItGoes) {
   start();
   const auto page = caught_up();
   show(3);
-  feed_.tell(end_message(3, false, "stopped by request; coasted"));
+  feed_.tell(end_message(3, false, true, "stopped by request; coasted"));
   std::thread going([&] { server_.reset(); });
   const json end = page->hear("end");
   EXPECT_EQ(end["text"], "stopped by request; coasted");
+  EXPECT_EQ(end["at_rest"], true);
   while (!page->hear().is_discarded()) {
   }
   going.join();
