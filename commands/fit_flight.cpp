@@ -73,6 +73,16 @@ void print_log_findings(const FlightLog& log) {
   for (const Finding& finding : log.findings) fmt::print(stderr, "log           {}\n", finding.line());
 }
 
+/// What the fit refuses, it refuses of this file.
+std::pair<FlownBins, FlightFit> fit_or_name(const std::string& path, const FlightLog& log, const LoggedVehicle& vehicle,
+                                            const FlightPriors& priors) try {
+  FlownBins flown = flown_bins(log, vehicle);
+  FlightFit fit = fit_flight(flown, vehicle, priors);
+  return {std::move(flown), std::move(fit)};
+} catch (const FitError& why) {
+  throw FitError(fmt::format("{}: {}", path, why.what()));
+}
+
 }  // namespace
 
 bool is_flight_log(const std::string& path, const std::string& layout) {
@@ -102,8 +112,7 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   for (const std::string& text : request.uncertainties) set_flight_uncertainty(priors, vehicle, text);
   const SpeedCheck speeds = check_speeds(log, profiles::rotors_of(file), request.blades);
   correct_speeds(log, speeds, priors);
-  const FlownBins flown = flown_bins(log, vehicle);
-  const FlightFit fit = fit_flight(flown, vehicle, priors);
+  const auto [flown, fit] = fit_or_name(request.path, log, vehicle, priors);
 
   IdentificationOptions options{.curve = {.form = request.form},
                                 .propeller = request.propeller.empty() ? file.name : request.propeller,

@@ -120,6 +120,7 @@ void Sequence::show_coast() {
 
 void Sequence::switch_off(StopWords& words) {
   const Instant since = bench_.clock().now();
+  const bool rests = position_.commanded.value() == 0 && guard_.observe(since).speed() <= kStandstill;
   const std::string why = bench_.supply()->switch_off();
   power_is_off_ = why.empty();
   if (!power_is_off_) {
@@ -132,9 +133,10 @@ void Sequence::switch_off(StopWords& words) {
   const auto newest = [this] { return guard_.observe(bench_.clock().now()).supply; };
   while (newest().time_ns < since.count() && bench_.clock().now() < give_up)
     bench_.wait_until(bench_.clock().now() + bench_.clock().stretched(kTickWall));
-  words.at_rest = !has_spun_;
-  words.state = has_spun_ ? "motor: ordered to coast, now without power; supply: output off"
-                          : "motor: was not turning; supply: output off";
+  words.at_rest = rests || !has_spun_;
+  words.state = fmt::format("motor: {}; supply: output off", !has_spun_ ? "was not turning"
+                                                             : rests    ? "at rest, now without power"
+                                                                        : "ordered to coast, now without power");
   const SupplyReading seen = newest();
   if (seen.protection == SupplyProtection::none) return;
   const Trip* trip = guard_.latch().trip();

@@ -199,6 +199,8 @@ try {
       await seen.waitForFunction(() => state.ended);
       assert.equal(await replay.ended, 0, replay.words);
       assert.equal(await seen.locator('#stop_word').innerText(), 'REPLAY OVER');
+      assert.ok(await seen.locator('#run_place').isHidden(), 'a run by itself has no number');
+      assert.equal(await seen.locator('#left').innerText(), '–');
       assert.match(await seen.title(), /^finished – /);
       await expectReadableAxes(seen);
       await seen.close();

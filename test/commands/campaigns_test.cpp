@@ -172,8 +172,9 @@ TEST_F(Campaigns, SayInEachOutputThatTheyAreSimulated) {
     for (const auto& step : results::read_steps(campaign_ / file)) EXPECT_EQ(step.simulated, 1) << file;
   const std::string zip = (out.path() / "c.zip").string();
   ASSERT_EQ(say({"pack", folder, "--out", zip}).code, 0);
-  for (const auto& [name, bytes] : contents_of(zip))
+  for (const auto& [name, bytes] : contents_of(zip)) {
     if (name.ends_with("README.md") || name.ends_with("ro-crate-metadata.json")) EXPECT_TRUE(says_so(bytes)) << name;
+  }
 }
 
 TEST_F(Campaigns, SayWhatTheyAreAndWhatComesNext) {

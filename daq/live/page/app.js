@@ -183,7 +183,7 @@ function showNumbers() {
   const waits = state.question !== null || (tick.silent_s > kSilent_s && !state.ended);
   text('step', state.ended ? '–' : waits ? 'waiting' : turns ? `${tick.step + 1}/${tick.steps}` : tick.phase || '–');
   text('step_word', state.ended || (turns && !waits) ? 'step' : '');
-  text('left', clock(tick.remaining_s || 0));
+  text('left', state.ended ? '–' : clock(tick.remaining_s || 0));
   at('progress_bar').style.transform = `scaleX(${Math.min(1, Math.max(0, tick.progress))})`;
   at('progress').setAttribute('aria-valuenow', Math.round(100 * tick.progress));
   if (state.hello.weighs && tick.phase === 'measuring' && !state.ended) banner('', 'Measuring.', 'Hands off.');

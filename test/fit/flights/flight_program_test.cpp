@@ -140,6 +140,25 @@ TEST_F(FlightProgram, FitsComparesAndFliesAFlight) {
   EXPECT_GT(world["gamma"].get<double>(), 0.5);
 }
 
+TEST_F(FlightProgram, WritesATableOfWhatWasFlownThatComparesWithABench) {
+  const FlownLog flown = flown_log::fly(Kind::arms_moving, 23, {.seconds = 100});
+  write(flown);
+  const Answer fitted = fit(flown, "--accept --form table --no-report");
+  ASSERT_EQ(fitted.code, 0) << fitted.out << fitted.err;
+  const auto file = compensation::load_coefficients((folder_ / "flight.yaml").string());
+  ASSERT_GE(file.table.size(), 2u) << "K_T, and at least one angle that was flown";
+  for (const auto& row : file.table) {
+    ASSERT_TRUE(row.uncertainty);
+    const double phi = row.occlusion.value(), truth = flown.truth.k_t * flown.truth.ratio(phi);
+    EXPECT_NEAR(row.k.value(), truth, 1.5 * row.uncertainty->expanded_95) << to_degrees(row.occlusion) << " deg";
+    EXPECT_NEAR(file.curve.at(row.occlusion).value(), row.k.value(), 1e-5 * row.k.value());
+  }
+  bench(flown.truth, 1);
+  EXPECT_EQ(type("compare bench.yaml flight.yaml --expect agree").code, 0);
+  bench(flown.truth, 2);
+  EXPECT_EQ(type("compare bench.yaml flight.yaml --expect differ").code, 0);
+}
+
 TEST_F(FlightProgram, SaysWhatIsMissingInOneLine) {
   const FlownLog flown = flown_log::fly(Kind::arms_moving, 22, {.seconds = 40});
   write(flown);
@@ -153,6 +172,13 @@ TEST_F(FlightProgram, SaysWhatIsMissingInOneLine) {
   const Answer loss = fit(flown, "--curve-loss huber");
   EXPECT_EQ(loss.code, 2);
   EXPECT_THAT(loss.err, HasSubstr("is for a bench"));
+  std::ofstream(folder_ / "none.csv") << "time,specific_force1\n0,0\n0.01,0\n0.02,0\n";
+  std::ofstream(folder_ / "none.yaml")
+      << "format: kphi-flight-layout/1\nseries:\n  - {channel: time, series: time, unit: s}\n"
+         "  - {channel: specific_force, number: 1, series: specific_force1, unit: m/s^2}\n";
+  const Answer none = type(fmt::format("fit none.csv --layout none.yaml --vehicle {}", kVehicle));
+  EXPECT_EQ(none.code, 5) << none.err;
+  EXPECT_THAT(none.err, HasSubstr("none.csv: the log has no acceleration"));
 }
 
 }  // namespace flight_program_test
