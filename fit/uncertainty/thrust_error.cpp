@@ -133,7 +133,7 @@ Deviation deviation_of(const Weights& end, const Weights& chord, const Weights& 
 /// What the speed does to k(φ) beyond what flies, as shares: one trend for all φ, and what no straight line says of
 /// this one.
 struct SpeedEffect {
-  Estimate per_rad_s{};
+  Estimate per_rad_s{};    ///< as seen, less what noise makes of it in the mean
   double reach_rad_s = 0;  ///< from the speed to which k belongs to the slowest or the fastest one
   double excess = 0;
 
@@ -152,7 +152,7 @@ SpeedEffect of_speed(const Identification& identification, const ThrustEvidence&
   result.reach_rad_s = std::max(levels.back().speed_rad_s - reference, reference - levels.front().speed_rad_s);
   const double flown = evidence.trend ? evidence.trend->per_rad_s.value : 0;
   if (const auto all = common_trend(evidence.speed))
-    result.per_rad_s = {std::abs(all->value - flown), all->u, all->freedom};
+    result.per_rad_s = {std::sqrt(std::max(0.0, square(all->value - flown) - square(all->u))), all->u, all->freedom};
   double excess = 0, weights = 0;
   for (const SpeedCoefficient& level : levels) {
     if (std::isnan(level.standard_error)) return result;

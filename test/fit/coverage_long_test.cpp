@@ -60,7 +60,7 @@ TEST(ThousandCampaigns, CoverOnEightStands) {
 }
 
 // "Fit to fly" says that the thrust is within 3 % at 95 %. No stand but the bent one is further off in 5 of 100
-// campaigns or more. The number of one with errors as they are assumed is 2.4 % and scatters: 3 % are within its reach.
+// campaigns or more. The number of one with errors as they are assumed is 2.3 % and scatters: beyond 3 % in 6 of 100.
 TEST(ThousandCampaigns, AreWithCareWhereItIsDeserved) {
   constexpr unsigned kCampaigns = 1000;
   struct Stand {
@@ -75,7 +75,7 @@ TEST(ThousandCampaigns, AreWithCareWhereItIsDeserved) {
   StudyTruth bent = assumed;
   bent.bend = 0.04;
   for (const auto& [name, truth, least_care, most_care] :
-       {Stand{"quiet", without_kink(), 0, 50}, {"assumed sizes", assumed, 0, 100}, {"bent", bent, 950, 1000}}) {
+       {Stand{"quiet", without_kink(), 0, 50}, {"assumed sizes", assumed, 0, 80}, {"bent", bent, 950, 1000}}) {
     unsigned wrong = 0, care = 0, held = 0;
     double told = 0;
     for (unsigned seed = 1; seed <= kCampaigns; ++seed) {

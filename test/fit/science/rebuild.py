@@ -258,7 +258,7 @@ class Verdict:
             expected = one.k * (1 + flown * (w - self.reference))
             excess = (w ** 4 @ ((k / expected - 1) ** 2 - error2 / expected ** 2)) / (w ** 4).sum()
             reach = max(w.max() - self.reference, self.reference - w.min())
-            self.speed.append((max(abs(value - flown) * reach, math.sqrt(max(0.0, excess))), u * reach, nu))
+            self.speed.append((max(math.sqrt(max(0.0, (value - flown) ** 2 - u ** 2)) * reach, math.sqrt(max(0.0, excess))), u * reach, nu))
 
     def between(self, i, j, share, phi):
         """Weights of the chord and of the other end of where k may lie."""
