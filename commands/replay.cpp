@@ -57,8 +57,8 @@ std::vector<StepMean> reduced(std::span<const std::filesystem::path> runs) {
     results::LoadCellColumns cell;
     for (std::size_t task = next++; task < tasks.size(); task = next++) tasks[task](cell);
   };
-  std::vector<std::jthread> others;  // two in all for a processor: none is idle during the last run
-  for (std::size_t i = 1; i < std::min(std::size_t{2} * std::thread::hardware_concurrency(), tasks.size()); ++i)
+  std::vector<std::jthread> others;  // one in all for a processor: another costs more, by its memory, than it saves
+  for (std::size_t i = 1; i < std::min<std::size_t>(std::thread::hardware_concurrency(), tasks.size()); ++i)
     others.emplace_back(work);
   work();
   std::vector<StepMean> steps;
