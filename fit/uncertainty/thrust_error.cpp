@@ -113,21 +113,21 @@ Between between_occlusions(const std::vector<OcclusionCoefficient>& table, const
   return {middle, other};
 }
 
-/// How far k may lie from what flies, as shares of it.
+/// Where k may lie, and how far from what flies.
 struct Deviation {
-  double off = 0;  ///< as seen, less what noise makes of it in the mean
-  double u = 0;    ///< its error beyond that of k on the chord
+  Weights end;
+  double off = 0;  ///< share of what flies, as seen, less what noise makes of it in the mean
 };
 
 /// Of one end of Between; `flown` in the same k.
-Deviation deviation_of(const Weights& end, const Weights& chord, const Weights& flown, double flown_k,
+Deviation deviation_of(const Weights& end, const Weights& flown, double flown_k,
                        const std::vector<OcclusionCoefficient>& table) {
   const auto less = [](Weights a, const Weights& b) {
     for (std::size_t i = 0; i < a.size(); ++i) a[i] -= b[i];
     return a;
   };
   const double seen = value_of(end, table) / flown_k - 1, noise = u_of(less(end, flown), table) / flown_k;
-  return {std::sqrt(std::max(0.0, seen * seen - noise * noise)), u_of(less(end, chord), table) / flown_k};
+  return {end, std::sqrt(std::max(0.0, seen * seen - noise * noise))};
 }
 
 /// What the speed does to k(φ) beyond what flies, as shares: one trend for all φ, and what no straight line says of
@@ -189,11 +189,11 @@ class Account {
   [[nodiscard]] ThrustError at(double phi_deg) const {
     const auto& table = identification_.table;
     const Chord chord = chord_at(table, phi_deg);
-    std::vector<double> weights(table.size());
-    weights[chord.before] += 1 - chord.share;
-    weights[chord.after] += chord.share;
-    const double k = table[chord.before].k * (1 - chord.share) + table[chord.after].k * chord.share;
-    const double flown = curve_ ? flown_at(phi_deg) : k;
+    const Weights middle =
+        sum_of(one_of(table, chord.before, 1 - chord.share), one_of(table, chord.after, chord.share));
+    const double flown = curve_ ? flown_at(phi_deg) : value_of(middle, table);
+    const Deviation beside = curve_ ? beside_at(chord, phi_deg, flown) : Deviation{middle};
+    Weights weights = beside.end;
     for (double& weight : weights) weight /= flown;
     Budget scatter = evidence_.sources.budget("thrust", "1", 1, weights);
     const bool known = !std::isnan(scatter.combined());
@@ -207,9 +207,6 @@ class Account {
                               .freedom = freedom,
                               .remedy = std::move(remedy)});
     };
-    const Deviation beside = curve_ ? beside_at(chord, phi_deg, flown) : Deviation();
-    add("error of k(φ) between the occlusions", beside.u, std::numeric_limits<double>::infinity(),
-        "measure an occlusion there");
     add("air density", evidence_.air_density_u.value_or(0), std::numeric_limits<double>::infinity(), "");
     const Estimate steady{0, scatter.combined(), scatter.freedom()};
     const Estimate speed = speed_at(chord, within_.off_rad_s.back());
@@ -264,8 +261,8 @@ class Account {
     const Between may = between_occlusions(table, chord, phi_deg);
     const bool held = curve_->scaling_factor(from_degrees(phi_deg)) >= 1;  // at K_T
     const Weights flies = held ? one_of(table, 0) : identification_.curve_fit.weights_at(phi_deg);
-    const Deviation near = deviation_of(may.chord, may.chord, flies, flown, table);
-    const Deviation far = deviation_of(may.other, may.chord, flies, flown, table);
+    const Deviation near = deviation_of(may.chord, flies, flown, table);
+    const Deviation far = deviation_of(may.other, flies, flown, table);
     return far.off > near.off ? far : near;
   }
   [[nodiscard]] Estimate speed_at(const Chord& chord, double off_rad_s) const {

@@ -286,18 +286,17 @@ class Verdict:
         flown, flies = self.k[0] * factor, np.eye(len(self.k))[0] if factor >= 1 else line
         chord, other = self.between(i, j, share, phi)
         noise = lambda w: math.sqrt(((w * self.u) ** 2).sum()) / flown
-        ends = [(math.sqrt(max(0.0, (end @ self.k / flown - 1) ** 2 - noise(end - flies) ** 2)), noise(end - chord))
-                for end in (chord, other)]
-        off, off_u = ends[1] if ends[1][0] > ends[0][0] else ends[0]
+        near, far = (math.sqrt(max(0.0, (end @ self.k / flown - 1) ** 2 - noise(end - flies) ** 2)) for end in (chord, other))
+        off, end = (far, other) if far > near else (near, chord)
         speed = self.speed[i] if self.speed[i][0] > self.speed[j][0] else self.speed[j]
         rows = []
         for effects, nu, common in self.sources:
-            part = chord / flown * effects
+            part = end / flown * effects
             if isinstance(nu, list):
                 rows.append(joint(list(zip(np.abs(part), nu))))
             else:
                 rows.append((abs(part.sum()) if common else math.sqrt((part ** 2).sum()), nu))
-        u, nu = joint(rows + [(off_u, ENDLESS), (speed[1], speed[2])])
+        u, nu = joint(rows + [(speed[1], speed[2])])
         b = off + speed[0] + max(self.stray.get(self.phi[i], 0), self.stray.get(self.phi[j], 0))
         b += self.plate if phi < self.phi[1] else 0
         return folded(b, u * student(nu) / student(ENDLESS))  # (26)
