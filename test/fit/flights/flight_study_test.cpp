@@ -149,16 +149,18 @@ struct Verdicts {
       of_ratio = 0;  ///< called different: same propeller, 3 % more k, 3 % less kept
 };
 
-Verdicts against_benches(int flights, std::uint64_t first_seed) {
+Verdicts against_benches(int flights, std::uint64_t first_seed, const flown_log::Settings& settings = {}) {
   const test::TemporaryFolder folder;
   LoggedVehicle vehicle = flown_log::logged_vehicle();
   Verdicts found;
   Random random(first_seed);
   for (int n = 0; n < flights; ++n) {
-    const auto flown = flown_log::fly(Kind::arms_moving, first_seed + static_cast<std::uint64_t>(n));
+    const auto flown = flown_log::fly(Kind::arms_moving, first_seed + static_cast<std::uint64_t>(n), settings);
     vehicle.mass_kg = flown.truth.told_kg;
     const FlownBins bins = flown_bins(flown.log, vehicle);
-    const FlightFit fit = fit_flight(bins, vehicle);
+    FlightPriors priors;
+    priors.scale_u = settings.scale_u, priors.bias_u = settings.bias_u;
+    const FlightFit fit = fit_flight(bins, vehicle, priors);
     const ComparedResult flight =
         result_of(fitted_of(fit, bins, vehicle, {}, {.propeller = "5x3"}), "a flight", folder);
     const auto differs = [&](double level, double less) {
@@ -188,6 +190,16 @@ TEST(HundredsOfFlights, AgreeWithTheirBenchAndNotWithAnother) {
   EXPECT_LE(found.differ, 16);
   EXPECT_GE(found.of_ratio, 180);
   EXPECT_GE(found.of_level, 130);
+}
+
+/// Laid on six sides before the flight: `--u scale=0.002 --u bias=0.02`.
+constexpr flown_log::Settings kCalibrated{.scale_u = 0.002, .bias_u = 0.02};
+
+TEST(HundredsOfFlights, OfACalibratedAccelerometerFindThreePercentOfKTToo) {
+  const Verdicts found = against_benches(200, 12000, kCalibrated);
+  EXPECT_LE(found.differ, 16);
+  EXPECT_GE(found.of_ratio, 180);
+  EXPECT_GE(found.of_level, 180);
 }
 
 }  // namespace flight_study_test
