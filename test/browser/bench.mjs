@@ -66,15 +66,17 @@ export class Bench {
     bench_.folder = mkdtempSync(path.join(os.tmpdir(), 'kphi-browser-'));
     writeFileSync(bench_.path('wanted.yaml'), bench(bench_.folder, supply));
     writeFileSync(bench_.path('campaign.yaml'), campaign);
+    writeFileSync(bench_.path('short.yaml'), campaign.replace('repetitions: 20', 'repetitions: 1'));
     bench_.sim = new Child(inRealTime(kBenchPriority, [kphi, 'sim', bench_.path('wanted.yaml'), '--free-ports', '--resolved',
       bench_.path('bench.yaml'), '--truth-log', bench_.path('wire.jsonl')]));
     await bench_.sim.waitFor(/"rdt"/);
     return bench_;
   }
   path(name) { return path.join(this.folder, name); }
-  run(...more) {
+  run(...more) { return this.runs('campaign.yaml', ...more); }
+  runs(campaign, ...more) {
     if (this.child && this.child.code === undefined) throw new Error('another run is under way');
-    this.child = new Child(inRealTime(kRunPriority, [this.kphi, 'run', this.path('campaign.yaml'), '--bench',
+    this.child = new Child(inRealTime(kRunPriority, [this.kphi, 'run', this.path(campaign), '--bench',
       this.path('bench.yaml'), '--yes', '--out', this.path('results'), ...more]));
     return this.child;
   }

@@ -363,6 +363,26 @@ try {
     await page.close();
   });
 
+  await it('says that a campaign has finished, and of each reading that it is the last one', async () => {
+    const short = unpowered.runs('short.yaml', '--live');
+    const page = await open(browser, await addressOf(short));
+    assert.equal(await short.ended, 0, short.words);
+    await page.waitForFunction(() => state.ended && document.getElementById('speed').textContent === '–');
+    assert.match(await page.title(), /^finished – browser/);
+    assert.equal(await page.locator('#banner').innerText(), 'Campaign finished.');
+    assert.equal(await page.locator('#banner').getAttribute('class'), 'good');
+    assert.match(await page.locator('#speed_beside').innerText(), /^last value \d\d?, at rest$/);
+    assert.match(await page.locator('#thrust_beside').innerText(), /^last value −?0\.0\d\d$/);
+    const { run, occlusion, repetition, step, left, supply, module, coil, drive, received, lost } = await readings(page);
+    assert.deepEqual([run, occlusion, repetition, step, left, supply, drive, lost], ['1/1', '90°', '1/1', '–', '–', 'none', 'no fault', '0, 0']);
+    assert.match(`${module} ${coil} ${received}`, /^1\d\.\d\d V · 0\.\d\d A · \d W \d\d °C \d\d \d{3}$/);
+    assert.equal(await page.locator('#progress').getAttribute('aria-valuenow'), '100');
+    assert.match(await page.evaluate(() => getComputedStyle(document.querySelector('#readings dt'), '::after').content), /last/);
+    await expectReadableAxes(page);
+    await page.screenshot({ path: path.join(pictures, 'live_view_finished.png') });
+    await page.close();
+  });
+
   await it('cost the acquisition at 7 kHz no sample', () => {
     const results = bench.path('results'), journal = path.join(results, readdirSync(results).sort()[0], 'journal.jsonl');
     const accepted = readFileSync(journal, 'utf8').split('\n').filter(line => line.includes('"run_accepted"')).map(line => JSON.parse(line));
@@ -383,7 +403,7 @@ try {
     assert.ok(asked.length >= 6);
     assert.deepEqual(complaints.filter(text => !text.includes('ERR_CONNECTION_REFUSED')), []);
   });
-  console.log(`${results.length} of 15 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
+  console.log(`${results.length} of 16 shown in ${((performance.now() - began) / 1000).toFixed(1)} s`);
 } finally {
   await browser?.close();
   for (const each of [bench, other, unpowered]) each?.clear();
