@@ -120,7 +120,8 @@ void Sequence::show_coast() {
 
 void Sequence::switch_off(StopWords& words) {
   const Instant since = bench_.clock().now();
-  const bool rests = position_.commanded.value() == 0 && guard_.observe(since).speed() <= kStandstill;
+  const Observation last = guard_.observe(since);
+  const bool rests = position_.commanded.value() == 0 && last.motor_is_fresh() && last.speed() <= kStandstill;
   const std::string why = bench_.supply()->switch_off();
   power_is_off_ = why.empty();
   if (!power_is_off_) {
