@@ -29,11 +29,8 @@ Vector equilibrate(Matrix& design) {
 /// a b − product, exactly (Dekker's product by Veltkamp's halves, which is algorithm TwoProduct there). std::fma would
 /// do it too, in software and fifty times as slowly.
 Long rounded_off(Long a, Long b, Long product) {
-  const auto upper_half = [](Long x) {
-    static const Long split = std::ldexp(Long{1}, (std::numeric_limits<Long>::digits + 1) / 2) + 1;
-    const Long wide = split * x;
-    return wide - (wide - x);
-  };
+  constexpr Long kSplit = (1ULL << (std::numeric_limits<Long>::digits + 1) / 2) + 1;
+  const auto upper_half = [](Long x) { return kSplit * x - (kSplit * x - x); };
   const Long a_high = upper_half(a), a_low = a - a_high, b_high = upper_half(b), b_low = b - b_high;
   return ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
 }
