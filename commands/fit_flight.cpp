@@ -73,8 +73,8 @@ void print_log_findings(const FlightLog& log) {
   for (const Finding& finding : log.findings) fmt::print(stderr, "log           {}\n", finding.line());
 }
 
-/// What the fit refuses, it refuses of this file.
-std::pair<FlownBins, FlightFit> fit_or_name(const std::string& path, const FlightLog& log, const LoggedVehicle& vehicle,
+/// A refusal names the file.
+std::pair<FlownBins, FlightFit> fit_of_file(const std::string& path, const FlightLog& log, const LoggedVehicle& vehicle,
                                             const FlightPriors& priors) try {
   FlownBins flown = flown_bins(log, vehicle);
   FlightFit fit = fit_flight(flown, vehicle, priors);
@@ -112,7 +112,7 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   for (const std::string& text : request.uncertainties) set_flight_uncertainty(priors, vehicle, text);
   const SpeedCheck speeds = check_speeds(log, profiles::rotors_of(file), request.blades);
   correct_speeds(log, speeds, priors);
-  const auto [flown, fit] = fit_or_name(request.path, log, vehicle, priors);
+  const auto [flown, fit] = fit_of_file(request.path, log, vehicle, priors);
 
   IdentificationOptions options{.curve = {.form = request.form},
                                 .propeller = request.propeller.empty() ? file.name : request.propeller,
