@@ -65,6 +65,16 @@ TEST(ThrustError, OfACleanStandIsNotMuchLargerThanItIs) {
   EXPECT_GE(told.fits, 57);
 }
 
+TEST(ThrustError, TakesNoiseForATrendWithTheSpeedInFewCampaigns) {
+  int taken = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const Analysis analysis =
+        analyse(identify(study_campaign(without_kink(), seed).steps), study_options(without_kink()));
+    taken += std::ranges::count(analysis.flight.error.parts, "k against speed", &ThrustErrorPart::name) > 0 ? 1 : 0;
+  }
+  EXPECT_LE(taken, 45) << "of 60; 57, were its error not taken off what was seen";
+}
+
 TEST(ThrustError, NamesItsLargestPartAndTheNextMove) {
   const StudyTruth truth{.calibration = 0.02};
   const Analysis analysis = analyse(identify(study_campaign(truth, 1).steps), study_options(truth));
