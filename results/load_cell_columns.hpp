@@ -2,16 +2,13 @@
 // campaign is reduced at the speed of memory.
 #pragma once
 
-#include <sys/mman.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <new>
 #include <span>
 #include <vector>
 
+#include "base/huge_pages.hpp"
 #include "results/records.hpp"
 
 namespace kphi::results {
@@ -19,24 +16,6 @@ namespace kphi::results {
 // Bits of the status word of every product.
 inline constexpr std::uint32_t kMonitorBit = 1u << 16;  ///< a condition the user set; raises the summary bit, too
 inline constexpr std::uint32_t kSummaryBit = 1u << 31;
-
-/// Memory in huge pages, where the system has them: the first touch of each small one takes longer than filling it.
-template <class T>
-struct HugePages {
-  using value_type = T;
-  T* allocate(std::size_t n) {
-    constexpr std::size_t kPage = 2u << 20;
-    const std::size_t bytes = (n * sizeof(T) + kPage - 1) / kPage * kPage;
-    void* memory = std::aligned_alloc(kPage, bytes);
-    if (memory == nullptr) throw std::bad_alloc();
-    ::madvise(memory, bytes, MADV_HUGEPAGE);
-    return static_cast<T*>(memory);
-  }
-  void deallocate(T* memory, std::size_t) { std::free(memory); }
-  /// Without a value: what is read into a column needs no zeros before.
-  void construct(T* number) { ::new (number) T; }
-  bool operator==(const HugePages&) const = default;
-};
 
 struct LoadCellColumns {
   using Counts = std::array<std::int32_t, 6>;

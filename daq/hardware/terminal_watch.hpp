@@ -10,7 +10,6 @@
 
 #include "base/clock.hpp"
 #include "base/descriptor.hpp"
-#include "base/wakeup.hpp"
 
 namespace kphi::daq {
 

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/descriptor.hpp"
 #include "base/thread.hpp"
-#include "base/wakeup.hpp"
 
 namespace kphi::daq {
 namespace {

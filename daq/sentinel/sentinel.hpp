@@ -16,7 +16,6 @@
 
 #include "base/descriptor.hpp"
 #include "base/last_word.hpp"
-#include "base/wakeup.hpp"
 
 namespace kphi::daq {
 

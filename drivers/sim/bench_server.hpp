@@ -8,7 +8,7 @@
 #include <string>
 
 #include "base/clock.hpp"
-#include "base/wakeup.hpp"
+#include "base/descriptor.hpp"
 #include "drivers/sim/simulated_bench.hpp"
 #include "drivers/sim/supply/port.hpp"
 #include "drivers/sim/transport/conversations.hpp"
@@ -59,7 +59,8 @@ class Server {
   [[nodiscard]] const Unsent& unsent() const noexcept { return unsent_; }
 
  private:
-  void step(const Clock& clock);
+  /// `woken`: the first step after a wait; `requested`: the Net Box has been asked something.
+  void step(const Clock& clock, bool woken, bool requested);
   void hear_requests();
   void hear_motor(Instant now);
   void log_motion(Instant now);

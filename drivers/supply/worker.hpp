@@ -19,9 +19,9 @@
 #include <string>
 #include <thread>
 
+#include "base/descriptor.hpp"
 #include "base/error.hpp"
 #include "base/published.hpp"
-#include "base/wakeup.hpp"
 #include "drivers/supply/supply.hpp"
 
 namespace kphi::supply {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
-#include "base/wakeup.hpp"
+#include "base/descriptor.hpp"
 
 namespace kphi::thread_test {
 

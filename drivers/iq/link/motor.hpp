@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "base/wakeup.hpp"
+#include "base/descriptor.hpp"
 #include "drivers/iq/session/session.hpp"
 
 namespace kphi::iq {

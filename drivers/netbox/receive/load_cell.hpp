@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "base/clock.hpp"
+#include "base/descriptor.hpp"
 #include "base/published.hpp"
-#include "base/wakeup.hpp"
 #include "drivers/netbox/configuration/configuration.hpp"
 #include "drivers/netbox/receive/udp_socket.hpp"
 #include "drivers/netbox/stream/connection.hpp"

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/device_data.hpp"
+#include "base/huge_pages.hpp"
 
 namespace kphi::netbox {
 
@@ -17,7 +18,7 @@ namespace kphi::netbox {
 class RecordQueue {
  public:
   /// Holds at least `records`.
-  explicit RecordQueue(std::size_t records) : slots_(std::bit_ceil(records)) {}
+  explicit RecordQueue(std::size_t records) : slots_(std::bit_ceil(records), LoadCellRecord{}) {}
 
   /// Writer: the slots of the next `count` records; empty when they do not fit in one piece: push() them.
   [[nodiscard]] std::span<LoadCellRecord> slots(std::size_t count) noexcept {
@@ -52,8 +53,8 @@ class RecordQueue {
   }
 
  private:
-  std::vector<LoadCellRecord> slots_;      // their number is a power of two
-  alignas(64) std::uint64_t written_ = 0;  // this and the others count since construction
+  std::vector<LoadCellRecord, HugePages<LoadCellRecord>> slots_;  // their number is a power of two
+  alignas(64) std::uint64_t written_ = 0;                         // this and the others count since construction
   alignas(64) std::atomic<std::uint64_t> published_{0};
   alignas(64) std::atomic<std::uint64_t> taken_{0};
 };

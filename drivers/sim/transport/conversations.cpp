@@ -68,8 +68,9 @@ void Conversations::listen_at(Descriptor listener) {
   if (!listening()) connections_.clear();
 }
 
-void Conversations::serve() {
-  welcome();
+void Conversations::serve(bool called) {
+  if (called) welcome();
+  if (connections_.empty()) return;
   const auto now = std::chrono::steady_clock::now();
   for (auto& connection : connections_) {
     hear(connection);

@@ -50,8 +50,11 @@ class Conversations {
   /// Replaces the listener; an empty one refuses connections and ends the open ones.
   void listen_at(Descriptor listener);
   [[nodiscard]] bool listening() const noexcept { return listener_.number() >= 0; }
-  /// Does what can be done now; also drops clients that were silent for 3 s of wall time.
-  void serve();
+  /// To wait at for who calls; -1: nobody can.
+  [[nodiscard]] int listener() const noexcept { return listener_.number(); }
+  /// Does what can be done now; also drops clients that were silent for 3 s of wall time. `called`: somebody may wait
+  /// to be welcomed.
+  void serve(bool called = true);
 
  private:
   struct Connection {
