@@ -2,12 +2,14 @@
 #pragma once
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/error.hpp"
 #include "base/json.hpp"
@@ -53,6 +55,11 @@ CLI::Option* add_argument(CLI::App& command, const char* name, Value& into, cons
 template <class Value>
 CLI::Option* add_value(CLI::App& command, const char* name, const char* word, Value& into, const std::string& what) {
   return command.add_option(name, into, what)->type_name(word);
+}
+
+/// One of `names`, which --help does not list with the option; completion knows them.
+inline CLI::Validator one_of(const std::vector<std::string>& names) {
+  return CLI::IsMember(names).description("").name(fmt::format("{{{}}}", fmt::join(names, ",")));
 }
 
 /// Options that follow stand under this heading of --help; those before it are for every day.

@@ -308,13 +308,16 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
     names.emplace_back(target.name);
     footer += fmt::format("  {:<11} {}\n", target.name, target.what);
   }
-  command.add_option("--to", request.to, "target, see below")
-      ->required()
-      ->check(CLI::IsMember(names).description(""))
-      ->type_name("TARGET");
+  const auto those = [](bool Target::*property) {
+    std::vector<std::string> named;
+    for (const Target& target : targets())
+      if (target.*property) named.emplace_back(target.name);
+    return fmt::format("{}", fmt::join(named, ", "));
+  };
+  command.add_option("--to", request.to, "target, see below")->required()->check(one_of(names))->type_name("TARGET");
   add_value(command, "--out", "FILE", request.out, "output file (default: stdout)");
   add_value(command, "--vehicle", "FILE", request.vehicle,
-            "vehicle file, for targets that compute k from arm angles (c, px4, ros2, ardupilot)")
+            fmt::format("vehicle file, for targets that compute k from arm angles ({})", those(&Target::takes_vehicle)))
       ->check(kExistingFile);
   command.add_flag("--accept", request.accept, "export coefficients that are not fit to fly, too");
   begin_group(command, "What the file does not tell");
@@ -324,16 +327,20 @@ void add_export(CLI::App& program, ExitCode& exit_code) {
       .add_option("--speed-max-rpm", request.options.speed_max_rpm,
                   "speed at full output (default: the vehicle's, else the file's)")
       ->check(CLI::PositiveNumber);
-  command.add_option("--motors", request.options.motors, "number of motors for px4 and gazebo (default 4)")
+  command
+      .add_option("--motors", request.options.motors,
+                  fmt::format("number of motors ({}; default 4)", those(&Target::for_each_motor)))
       ->check(CLI::Range(1, 12));
   command
       .add_option_function<std::string>(
           "--turns", [&request = request](const std::string& text) { request.options.turns = parse_turns(text); },
-          "how the motors turn, seen from above, for the sign of their torque (px4, gazebo)")
+          fmt::format("how the motors turn, seen from above, for the sign of their torque ({})",
+                      those(&Target::for_each_motor)))
       ->type_name("ccw,cw,…");
   add_notes(command, "Targets:\n" + footer +
                          "\nkphi lists on stderr what a target cannot hold.\n"
-                         "Of a log without occlusions (K_T alone) all but c, and all without --vehicle.");
+                         "Of a log without occlusions (K_T alone) all but " +
+                         those(&Target::needs_curve) + ", and all without --vehicle.");
 }
 
 }  // namespace kphi::commands

@@ -73,16 +73,6 @@ void print_log_findings(const FlightLog& log) {
   for (const Finding& finding : log.findings) fmt::print(stderr, "log           {}\n", finding.line());
 }
 
-/// A refusal names the file.
-std::pair<FlownBins, FlightFit> fit_of_file(const std::string& path, const FlightLog& log, const LoggedVehicle& vehicle,
-                                            const FlightPriors& priors) try {
-  FlownBins flown = flown_bins(log, vehicle);
-  FlightFit fit = fit_flight(flown, vehicle, priors);
-  return {std::move(flown), std::move(fit)};
-} catch (const FitError& why) {
-  throw FitError(fmt::format("{}: {}", path, why.what()));
-}
-
 }  // namespace
 
 bool is_flight_log(const std::string& path, const std::string& layout) {
@@ -94,7 +84,7 @@ bool is_flight_log(const std::string& path, const std::string& layout) {
   return bytes.starts_with("ULog\x01\x12\x35") || bytes.front() == '\xBC';
 }
 
-ExitCode fit_flight_log(const FlightFitRequest& request) {
+ExitCode fit_flight_log(const FlightFitRequest& request) try {
   if (request.vehicle.empty())
     throw ConfigurationError(request.path +
                              ": a flight log; its vehicle file tells arms, propellers and mass (--vehicle FILE)");
@@ -112,7 +102,8 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   for (const std::string& text : request.uncertainties) set_flight_uncertainty(priors, vehicle, text);
   const SpeedCheck speeds = check_speeds(log, profiles::rotors_of(file), request.blades);
   correct_speeds(log, speeds, priors);
-  const auto [flown, fit] = fit_of_file(request.path, log, vehicle, priors);
+  const FlownBins flown = flown_bins(log, vehicle);
+  const FlightFit fit = fit_flight(flown, vehicle, priors);
 
   IdentificationOptions options{.curve = {.form = request.form},
                                 .propeller = request.propeller.empty() ? file.name : request.propeller,
@@ -159,6 +150,8 @@ ExitCode fit_flight_log(const FlightFitRequest& request) {
   if (fitted.analysis.flight.readiness() != Readiness::not_yet || request.accept) return ExitCode::ok;
   fmt::print(stderr, "kphi fit: do not fly yet (see above); --accept takes the result all the same\n");
   return ExitCode::data_rejected;
+} catch (const FitError& why) {  // a refusal names the file
+  throw FitError(fmt::format("{}: {}", request.path, why.what()));
 }
 
 }  // namespace kphi::commands

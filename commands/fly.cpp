@@ -396,7 +396,7 @@ void add_fly(CLI::App& program, ExitCode& exit_code) {
   for (const Experiment& experiment : kExperiments) names.emplace_back(experiment.name);
   add_value(command, "--experiment", "NAME", request.experiment,
             fmt::format("one of the nine (default: all): {}", fmt::join(names, ", ")))
-      ->check(CLI::IsMember(names).description(""));
+      ->check(one_of(names));
   command.add_option("--seed", request.seed, "seed of noise and draws")->capture_default_str();
   command
       .add_option("--threads", request.threads,

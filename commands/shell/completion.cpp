@@ -35,18 +35,28 @@ std::vector<std::string> choices_in(const std::string& type) {
   return choices;
 }
 
-std::vector<VerbWords> verbs_of(const CLI::App& program) {
+/// What its value may be, as --help shows it, or as one_of() keeps it.
+std::vector<std::string> choices_of(CLI::Option& option) {
+  if (auto shown = choices_in(option.get_type_name()); !shown.empty()) return shown;
+  try {
+    return choices_in(option.get_validator(0)->get_name());
+  } catch (const CLI::OptionNotFound&) {  // any value
+    return {};
+  }
+}
+
+std::vector<VerbWords> verbs_of(CLI::App& program) {
   std::vector<VerbWords> all;
-  for (const CLI::App* verb : program.get_subcommands([](const CLI::App*) { return true; })) {
+  for (CLI::App* verb : program.get_subcommands([](CLI::App*) { return true; })) {
     VerbWords words{verb->get_name(), verb->get_description(), {}, {}};
-    for (const CLI::Option* option : verb->get_options()) {
+    for (CLI::Option* option : verb->get_options()) {
       const std::string value = option->get_items_expected_max() > 0 ? option->get_type_name() : "";
       if (option->get_lnames().empty()) {
-        words.choices = choices_in(option->get_type_name());
+        words.choices = choices_of(*option);
         continue;
       }
       words.options.push_back(
-          {"--" + option->get_lnames().front(), value, choices_in(value), option->get_description()});
+          {"--" + option->get_lnames().front(), value, choices_of(*option), option->get_description()});
     }
     all.push_back(std::move(words));
   }

@@ -53,6 +53,9 @@ void stop_running(int) {
 profiles::BenchConfig load_simulated(const SimRequest& options) {
   profiles::BenchConfig bench = profiles::load_bench(options.bench);
   if (!bench.simulation) refuse(bench.path, "a real bench cannot be simulated; add a `simulation` section");
+  if (bench.load_cell || bench.motor)
+    refuse(bench.path,
+           "kphi sim is a Net Box and an IQ module; start the simulator of `load_cell` and `motor` instead");
   if (bench.simulation->in_process)
     refuse(bench.path, "`simulation.in_process` needs no server; start `kphi run` directly");
   if (bench.simulation->control.empty())

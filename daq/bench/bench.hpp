@@ -134,7 +134,7 @@ class LoadCellLink {
   /// The Net Box behind it, as last read, likewise; nullptr: another kind of load cell.
   [[nodiscard]] virtual const netbox::Configuration* box() const { return nullptr; }
   /// Samples that arrive at once.
-  [[nodiscard]] int records_together() const { return box() != nullptr ? box()->records_per_datagram : 1; }
+  [[nodiscard]] virtual int records_together() const { return box() != nullptr ? box()->records_per_datagram : 1; }
   /// Findings of connecting, worst first; faults throw instead.
   [[nodiscard]] virtual std::vector<Finding> findings() const { return {}; }
   /// Reads the configuration and starts the stream. Throws DeviceError.

@@ -69,12 +69,12 @@ void offer_devices(Table& table, const DeviceLimits& devices) {
            "coil_temperature_estimator.otw");
 }
 
-/// Limits that neither a file nor a device sets.
 /// A slow supply's reading is that old when the next one is there.
 double patience_with_supply(const DeviceLimits* devices) {
   return std::max(kSupplyPatience, 1 + 2 * (devices != nullptr ? devices->supply_reading_s : 0));
 }
 
+/// Limits that neither a file nor a device sets.
 void offer_own(Table& table, const profiles::BenchConfig& config, const DeviceLimits* devices) {
   offer(table, Watched::speed_error, 100 * SpeedWatch::kShare, "kphi");
   offer(table, Watched::load_cell_age, to_seconds(spin_patience(config)), "kphi, while the motor turns");

@@ -60,6 +60,9 @@ struct Target {
   const char* name;
   const char* what;
   Export (*write)(const compensation::Coefficients&, const ExportOptions&);
+  bool takes_vehicle = false;   ///< computes k from arm angles
+  bool for_each_motor = false;  ///< a block for each motor, with its turn
+  bool needs_curve = false;     ///< K_T alone is refused
 };
 [[nodiscard]] std::span<const Target> targets();
 

@@ -10,6 +10,7 @@
 #include "base/json.hpp"
 #include "test/daq/bench_fixture.hpp"
 #include "test/end_to_end/process.hpp"
+#include "test/source_dir.hpp"
 #include "test/temporary_folder.hpp"
 
 namespace kphi::test {
@@ -124,6 +125,9 @@ TEST_F(FirstSteps, AnOutputThatCannotBeIsRefusedBeforeAnythingHappens) {
   const Answer sim = say("sim bench.yaml --truth nofolder/truth.yaml");
   EXPECT_EQ(sim.code, 2);
   EXPECT_THAT(sim.err, HasSubstr("the folder nofolder does not exist"));
+  const Answer others = say("sim " + test::source_dir() + "/examples/second_bench/bench.yaml");
+  EXPECT_EQ(others.code, 2);
+  EXPECT_THAT(others.err, HasSubstr("start the simulator of `load_cell` and `motor` instead"));
 }
 
 TEST_F(FirstSteps, EveryVerbEndsItsHelpWithAnExampleOfItsOwn) {
@@ -152,8 +156,9 @@ TEST_F(FirstSteps, CompletionKnowsVerbsOptionsAndChoices) {
   const std::string ask =
       "completion bash > c.sh; bash -c 'source ./c.sh; COMP_WORDS=(kphi run --dr); COMP_CWORD=2; _kphi; echo "
       "\"${COMPREPLY[@]}\"; COMP_WORDS=(kphi fit --form ta); COMP_CWORD=3; _kphi; echo \"${COMPREPLY[@]}\"; "
-      "COMP_WORDS=(kphi we); COMP_CWORD=1; _kphi; echo \"${COMPREPLY[@]}\"'";
-  EXPECT_EQ(say(ask).out, "--dry-run\ntable\nweigh\n");
+      "COMP_WORDS=(kphi export --to ga); _kphi; echo \"${COMPREPLY[@]}\"; COMP_WORDS=(kphi we); COMP_CWORD=1; _kphi; "
+      "echo \"${COMPREPLY[@]}\"'";
+  EXPECT_EQ(say(ask).out, "--dry-run\ntable\ngazebo\nweigh\n");
 }
 
 TEST_F(FirstSteps, ListTellsEachCampaignInALine) {

@@ -305,8 +305,6 @@ TEST(Targets, SayWhatTheyCannotHold) {
     EXPECT_FALSE(result.lost.empty());
     for (const std::string& reason : result.lost) EXPECT_THAT(reason, HasSubstr(": ")) << "what, and why";
   }
-  EXPECT_EQ(names, (std::set<std::string>{"agilicious", "px4", "gazebo", "ros2", "c", "ardupilot", "betaflight",
-                                          "crazyflie", "csv", "mcap"}));
 }
 
 TEST(Targets, RefuseAnOcclusionThatWasNotMeasured) {
