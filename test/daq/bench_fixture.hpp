@@ -11,8 +11,8 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -27,8 +27,9 @@
 namespace kphi::test {
 
 inline std::string bytes_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream all;
+  all << std::ifstream(file, std::ios::binary).rdbuf();  // block by block: test code is not optimized
+  return all.str();
 }
 
 /// N per (rad/s)² of the simulated propeller "5x3".

@@ -35,7 +35,7 @@ class KilledCampaign : public testing::TestWithParam<int> {
     fit_ = coefficients_of(whole);
   }
   static std::string coefficients_of(const results::CampaignFolder& folder) {
-    (void)ran({kphi(), "fit", "--accept", folder.path().string()});
+    (void)ran({kphi(), "fit", "--accept", "--no-report", folder.path().string()});
     return bytes_of(folder.coefficients());
   }
   /// Returns how often it was killed on its way to the end.

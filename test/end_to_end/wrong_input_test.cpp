@@ -53,7 +53,7 @@ TEST(NotFiniteEither, ReachesAWeighingNoMoreThanAnExport) {
 
   const VirtualCampaign here(short_campaign_text("0, 90, 180"));
   const std::string folder = ran(here.command()).folder();
-  (void)ran({kphi(), "fit", "--accept", folder});
+  (void)ran({kphi(), "fit", "--accept", "--no-report", folder});
   const Ended exported =
       ran({kphi(), "export", folder + "/coefficients.yaml", "--to", "gazebo", "--speed-max-rpm", "nan"}, 2);
   EXPECT_THAT(exported.err, AllOf(HasSubstr("--speed-max-rpm"), HasSubstr("nan")));

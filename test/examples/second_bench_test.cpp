@@ -233,7 +233,7 @@ TEST_F(SecondBench, RunsACampaignAndFitsWhatTheStandWasBuiltWith) {
                   "limits: {speed_max_rpm: 19100, thrust_max_n: 20, supply_current_max_a: 35, "
                   "coil_temperature_max_degc: 110}\n"))
           .folder();
-  (void)ran({kphi(), "fit", "--accept", folder});
+  (void)ran({kphi(), "fit", "--accept", "--no-report", folder});
   EXPECT_THAT(ran({kphi(), "verify", folder}).out, HasSubstr("intact: 3 runs"));
   const auto file = YAML::LoadFile(folder + "/coefficients.yaml");
   const double expanded = file["K_T"]["expanded_95"].as<double>();
